@@ -19,6 +19,8 @@ import numpy as np
 import pandas as pd
 
 from calibration.errors import CalibrationError, ResultsExistError
+from thermal.case.load import NAME as CASE_FILE
+from thermal.folders import check_writable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes as Axes
@@ -115,18 +117,17 @@ def check_results_folder(out: str | Path, force: bool = False) -> Path:
     Raises
     ------
     ResultsExistError
-        When it holds something and ``force`` is not set, or is a file.
+        When it holds something and ``force`` is not set, is a case folder, or a file.
     CalibrationError
         When it cannot be written to.
     """
     folder = Path(out)
     if (folder.exists() or folder.is_symlink()) and not folder.is_dir():
         raise ResultsExistError(f"{folder}: expected a folder for results, found a file; choose another name")
-    nearest = next((p for p in (folder, *folder.absolute().parents) if p.exists()), Path("/"))
-    if not nearest.is_dir() or not os.access(nearest, os.W_OK | os.X_OK):
-        raise CalibrationError(
-            f"{folder}: expected a place that can be written to, and {nearest} cannot; choose another"
-        )
+    check_writable(folder, CalibrationError)
+    if (folder / CASE_FILE).is_file():
+        advice = "choose a folder of its own, such as one inside of it"
+        raise ResultsExistError(str(folder), "a folder for results", "a case folder", advice)
     if folder.is_dir() and not force:
         held = sorted(path.name for path in folder.iterdir())
         if held:
@@ -151,7 +152,7 @@ def write_results(out: str | Path, files: Mapping[str, Content], force: bool = F
     force : bool
         Replace files of the same name; what else the folder holds stays.
     work : Path, optional
-        Folder on the same disk that is written to first; that which `out` lies in by default.
+        Folder on the same disk that is written to first; by default `out` itself, or that which it is to lie in.
 
     Returns
     -------
@@ -169,7 +170,8 @@ def write_results(out: str | Path, files: Mapping[str, Content], force: bool = F
             raise ResultsExistError(f"{folder}: expected plain file names for results, got {name!r}")
     folder = folder.resolve()
     folder.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=f".{folder.name}-", dir=work or folder.parent) as made:
+    beside = folder if folder.is_dir() else folder.parent  # a folder that is there may be a disk of its own
+    with tempfile.TemporaryDirectory(prefix=f".{folder.name}-", dir=work or beside) as made:
         new, old = Path(made) / "new", Path(made) / "old"
         new.mkdir()
         old.mkdir()

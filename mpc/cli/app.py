@@ -2,11 +2,14 @@
 
 import errno
 import os
+import re
 import sys
 import traceback
 from collections.abc import Callable
 from functools import wraps
+from importlib import metadata
 from io import TextIOWrapper
+from json import dumps
 from typing import Annotated, Any, ParamSpec
 
 import typer
@@ -29,6 +32,12 @@ P = ParamSpec("P")
 #: Exit codes of the contract: success is 0.
 FAILURE, BAD_INPUT = 1, 2
 
+#: Error of the command line itself, such as an option that there is not.
+_USAGE: Any = typer.BadParameter.__base__
+
+#: What a message says to a caller of the Python function, in brackets behind the option of the command.
+_KEYWORD = re.compile(r" \(\w+=\w+\)")
+
 _settings: dict[str, Any] = {"debug": False, "plugins": []}
 
 app = typer.Typer(
@@ -36,32 +45,32 @@ app = typer.Typer(
     help="Model a real building, calibrate it on telemetry, and say how far its predictions are off.",
     epilog="Start with: buildingmpc demo",
     no_args_is_help=True,
+    invoke_without_command=True,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
 
-def _version(asked: bool) -> None:
-    if asked:
-        from importlib.metadata import version
-
-        typer.echo(f"buildingmpc {version('buildingmpc')}")
-        raise typer.Exit
-
-
 @app.callback()
 def options(
-    debug: Annotated[bool, switch("--debug", "Show the traceback of an error.")] = False,
+    context: typer.Context,
+    debug: Annotated[bool, switch("--debug", "Show where in the code an error came up.")] = False,
     plugin: Annotated[
         list[str] | None, value("Module or .py file that adds controllers, effects, ...; repeatable.", "MODULE")
     ] = None,
-    version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
-    ] = False,
+    version: Annotated[bool, switch("--version", "Show the version and exit; with --json as JSON.")] = False,
+    json: Annotated[bool, typer.Option("--json", hidden=True)] = False,
 ) -> None:
     """Take the options that stand before the subcommand."""
     _settings["debug"] = debug
     _settings["plugins"] = plugin or []
+    if version:
+        found = {"name": "buildingmpc", "version": metadata.version("buildingmpc")}
+        typer.echo(dumps(found) if json else f"{found['name']} {found['version']}")
+        raise typer.Exit
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+        raise typer.Exit
 
 
 def _guarded(command: Callable[P, int]) -> Callable[P, None]:
@@ -78,22 +87,24 @@ def _guarded(command: Callable[P, int]) -> Callable[P, None]:
         except Exception as error:
             if isinstance(error, OSError) and error.errno == errno.EPIPE:  # a pipe's reader has gone: nothing to say
                 raise
-            code = _report(error, command.__name__)
+            code = _report(error, command.__name__.replace("_", "-"), kwargs.get("json") is True)
         raise typer.Exit(code)
 
     return run
 
 
-def _report(error: Exception, command: str) -> int:
-    """Say what went wrong on stderr and choose the exit code."""
+def _report(error: Exception, command: str, json: bool) -> int:
+    """Say what went wrong on stderr, and on stdout where JSON is asked for; choose the exit code."""
     if _settings["debug"]:
         traceback.print_exception(error, file=sys.stderr)
-    typer.echo(f"error: {type(error).__name__}: {error}", err=True)
-    if isinstance(error, Described):
-        return BAD_INPUT
-    if not _settings["debug"]:
-        typer.echo(f"For the traceback: buildingmpc --debug {command} ...", err=True)
-    return FAILURE
+    told = _KEYWORD.sub("", str(error))
+    typer.echo(f"error: {type(error).__name__}: {told}", err=True)
+    code = BAD_INPUT if isinstance(error, Described) else FAILURE
+    if json:
+        typer.echo(dumps({"error": {"name": type(error).__name__, "message": told, "exit_code": code}}))
+    if code == FAILURE and not _settings["debug"]:
+        typer.echo(f"For the place in the code: buildingmpc --debug {command} ...", err=True)
+    return code
 
 
 for _command in (
@@ -110,4 +121,14 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal without the letter must not turn a result into an error
-    app()
+    if "--json" not in sys.argv:
+        app()
+    try:
+        sys.exit(app(standalone_mode=False))
+    except _USAGE as error:
+        error.show()
+        content = {"name": "UsageError", "message": error.format_message(), "exit_code": error.exit_code}
+        typer.echo(dumps({"error": content}))
+        sys.exit(error.exit_code)
+    except typer.Abort:
+        sys.exit(FAILURE)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from mpc.cli.console import Waiting, answer, complain, say, show_table
+from mpc.cli.doctor import missing_extras
 from mpc.cli.options import CaseFolder, Dx, Force, Json, Parameters, Start, file, folder, spread, switch, value
 
 if TYPE_CHECKING:
@@ -192,4 +193,5 @@ def _show_demo(found: Demo, out: Path) -> None:
     rows = [(row[0], row[1], row[4], row[6]) for row in comparison_rows(found.comparison)]
     show_table(f"Controllers, {content['control']['start'][:10]}", columns, rows)
     say(f"Report: {out / 'report.html'}")
-    say("Next: buildingmpc label, for a case of your own")
+    add = missing_extras("pages", "plan")
+    say(f"Next: {f'{add}, then ' if add else ''}buildingmpc label, for a case of your own")

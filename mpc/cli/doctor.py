@@ -37,6 +37,18 @@ def doctor(json: Json = False) -> int:
     return 0 if content["fine"] else 1
 
 
+def missing_extras(*extras: str) -> str:
+    """Write the line that installs extras, where a package of theirs is missing; empty where none is.
+
+    Parameters
+    ----------
+    *extras : str
+        Names of extras.
+    """
+    lacking = {package["extra"] for package in _installed_packages() if not package["fine"]}
+    return f'pip install "{DISTRIBUTION}[{",".join(extras)}]"' if lacking & {*extras} else ""
+
+
 def _show(content: dict[str, Any]) -> None:
     packages = content["packages"]
     say(f"{DISTRIBUTION} {content['version']}, Python {content['python']}, {content['platform']}")

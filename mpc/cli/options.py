@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from mpc.cli.console import complain
+
 if TYPE_CHECKING:
     from calibration.evaluation.intervals import Interval
     from thermal.case.case import Case
@@ -90,7 +92,7 @@ def interval(what: str, default: str) -> Any:
 
 
 def open_case(case: Path, out: Path | None, force: bool) -> Case:
-    """Load a case, once it is sure that the results may be written.
+    """Load a case, once it is sure that the results may be written; say on stderr when it has no windows.
 
     Parameters
     ----------
@@ -103,10 +105,14 @@ def open_case(case: Path, out: Path | None, force: bool) -> Case:
     """
     from calibration.results import check_results_folder
     from thermal.case.load import load_case
+    from thermal.case.validation import NO_WINDOWS, has_windows
 
     if out is not None:
         check_results_folder(out, force)
-    return load_case(case)
+    loaded = load_case(case)
+    if not has_windows(loaded.building):
+        complain(f"warning: {NO_WINDOWS.replace('CASE', str(case))}")
+    return loaded
 
 
 def parse_intervals(texts: Sequence[str] | None, case: Case) -> list[Interval]:

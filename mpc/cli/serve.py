@@ -35,7 +35,9 @@ def serve(
     cases: Annotated[
         list[Path] | None, typer.Argument(metavar="[CASE]...", help="Case folders; default: the bundled case.")
     ] = None,
-    boptest: Annotated[bool, switch("--boptest", "Behind BOPTEST's REST API.")] = False,
+    boptest: Annotated[
+        bool, typer.Option("--boptest", hidden=True, help="As without it: there is one API.")
+    ] = True,
     pilot: Annotated[
         bool, switch("--pilot", "Serve the generated pilot, too: 'pilot', and 'pilot_12' with 12 zones.")
     ] = False,
@@ -53,12 +55,11 @@ def serve(
 ) -> int:
     """Put buildings behind BOPTEST's REST API, so that its controllers run on them; ends with Ctrl-C.
 
-    Example: buildingmpc serve cases/office --boptest --parameters results/calibration.json --weather town.epw
+    Example: buildingmpc serve cases/office --parameters results/calibration.json --weather town.epw
     --port 8000
     """
     from mpc.adapters.boptest.server import BoptestServer, check_host
 
-    BoptestError.unless(boptest, "serve", "what to serve as", "nothing", "say --boptest")
     if parameters is not None and len(cases or ()) > 1:
         raise BoptestError("--parameters: expected one case that they belong to, found several; serve it alone")
     check_host(host, allow_remote)  # before the minutes that a large building takes

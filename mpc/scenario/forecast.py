@@ -72,7 +72,7 @@ class Forecast:
     Raises
     ------
     ScenarioError
-        When stamps have no time zone or do not rise, or a column is not known.
+        When stamps have no time zone or do not rise, or a column is not known or holds other than numbers.
     """
 
     table: pd.DataFrame
@@ -83,8 +83,9 @@ class Forecast:
             raise ScenarioError("forecast", "stamps with a time zone", f"an index of {index.dtype}")
         if not index.is_monotonic_increasing or not index.is_unique:
             raise ScenarioError("forecast", "stamps that rise", f"{index[0]} to {index[-1]}, out of order")
-        for column in self.table.columns:
+        for column, kind in zip(self.table.columns, self.table.dtypes, strict=True):
             column_unit(str(column))
+            ScenarioError.unless(kind.kind in "iufb", f"forecast: column {str(column)!r}", "numbers", kind)
 
     @classmethod
     def from_frame(cls, table: pd.DataFrame, units: Mapping[str, str]) -> Forecast:

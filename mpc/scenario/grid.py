@@ -16,6 +16,7 @@ from mpc.errors import ScenarioError
 from thermal._types import FloatArray
 from thermal.case.building import Building
 from thermal.case.case import local_timestamp
+from thermal.case.years import EXPECTED, FIRST_YEAR, LAST_YEAR, shown, within_years
 
 #: Local clocks, schedules and tariffs change on multiples of this [s]; offsets of time zones are whole quarter hours.
 RESOLUTION = 300
@@ -39,7 +40,7 @@ class StepGrid:
     Raises
     ------
     ScenarioError
-        When the start has no time zone, or a number is out of range.
+        When the start has no time zone or is of no year that stamps can lie in, or a number is out of range.
 
     Examples
     --------
@@ -55,6 +56,7 @@ class StepGrid:
     def __post_init__(self) -> None:
         zoned = self.start.tzinfo is not None and not self.start.microsecond
         ScenarioError.unless(zoned, "start", "a whole second in a time zone", repr(self.start))
+        ScenarioError.unless(FIRST_YEAR <= self.start.year <= LAST_YEAR, "start", EXPECTED, self.start)
         whole = self.step >= 1 and float(self.step).is_integer() and self.n_steps >= 1
         ScenarioError.unless(whole, "grid", "at least one step of a whole number of seconds", self)
 
@@ -165,6 +167,8 @@ def regular_steps(
     if not isinstance(index, pd.DatetimeIndex) or index.tz is None or len(index) < 1 + (not step):
         found = f"{len(index)} of {index.dtype}"
         raise error(where, "at least two stamps with a time zone", found)
+    if wrong := np.flatnonzero(~within_years(index)).tolist():
+        raise error(f"{where}: row {wrong[0] + 1}", EXPECTED, shown(index, wrong[0]), "correct the stamp")
     gaps = np.diff(index_seconds(index)) if len(index) > 1 else np.array([int(step)])
     uneven = (gaps != (step or gaps[0])) | (gaps <= 0) | (gaps > max(longest, step))
     if uneven.any():

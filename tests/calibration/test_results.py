@@ -155,6 +155,25 @@ def test_names_that_lead_elsewhere_are_refused(tmp_path: Path, name: str) -> Non
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("force", [False, True])
+def test_a_case_folder_is_no_folder_for_results(tmp_path: Path, force: bool) -> None:
+    case = tmp_path / "case"
+    case.mkdir()
+    (case / "building.yaml").write_text("format: 3", encoding="utf-8")
+    with pytest.raises(ResultsExistError, match="expected a folder for results, found a case folder"):
+        write_results(case, {"report.html": ""}, force=force)
+    assert [p.name for p in case.iterdir()] == ["building.yaml"]
+    write_results(case / "results", {"report.html": ""})  # inside of it they may be
+
+
+@pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="needs a file system that is not for files")
+@pytest.mark.parametrize("out", ["/proc", "/proc/results", "/proc/self/deep/results"])
+def test_a_place_that_cannot_be_written_to_is_named(out: str) -> None:
+    for force in (False, True):
+        with pytest.raises(CalibrationError, match="expected a place that can be written to, found"):
+            check_results_folder(out, force)
+
+
 # Shown
 
 

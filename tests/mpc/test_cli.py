@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 from typer.testing import CliRunner
 
-from mpc.cli.app import app
+from mpc.cli.app import app, main
 from thermal.data import bundled_case_path
 
 CASE = str(bundled_case_path())
@@ -76,7 +77,8 @@ def test_check_writes_and_answers_in_json(tmp_path: Path) -> None:
 
 def test_bad_input_is_named_on_stderr(spoilt: Path) -> None:
     answer = run("check", spoilt, "--json")
-    assert (answer.exit_code, answer.stdout) == (2, "")
+    assert answer.exit_code == 2 and json.loads(answer.stdout)["error"]["name"] == "CaseError"
+    assert run("check", spoilt).stdout == ""
     assert answer.stderr.startswith("error: CaseError: ")
     assert "nearest valid one is 'F1_W'" in answer.stderr and "Traceback" not in answer.stderr
 
@@ -126,8 +128,72 @@ def test_an_unexpected_error_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> No
     answer = run("check", CASE)
     assert (answer.exit_code, answer.stdout) == (1, "")
     assert answer.stderr == (
-        "error: ZeroDivisionError: of no one's making\nFor the traceback: buildingmpc --debug check ...\n"
+        "error: ZeroDivisionError: of no one's making\nFor the place in the code: buildingmpc --debug check ...\n"
     )
+
+
+@pytest.mark.parametrize(
+    ("words", "name", "told"),
+    [
+        (("check", "/nowhere"), "CaseError", "expected a case folder, found nothing"),
+        (("check", CASE, "--spam"), "UsageError", "No such option: --spam"),
+        (("chek",), "UsageError", "No such command 'chek'. Did you mean 'check'?"),
+        (("evaluate", CASE, "--out", "/proc/results"), "CalibrationError", "expected a place that can be written to"),
+    ],
+)
+def test_with_json_an_error_is_json(words: tuple[Any, ...], name: str, told: str, capsys, monkeypatch) -> None:
+    monkeypatch.setattr("sys.argv", ["buildingmpc", *map(str, words), "--json"])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    out, err = capsys.readouterr()
+    error = json.loads(out)["error"]
+    assert (error["name"], error["exit_code"], ended.value.code) == (name, 2, 2) and told in error["message"]
+    assert "Traceback" not in err and told in err
+
+
+def test_the_version_as_text_and_as_json() -> None:
+    from importlib.metadata import version
+
+    assert run("--version").stdout == f"buildingmpc {version('buildingmpc')}\n"
+    for words in (("--version", "--json"), ("--json", "--version")):
+        assert json.loads(run(*words).stdout) == {"name": "buildingmpc", "version": version("buildingmpc")}
+
+
+def test_a_command_is_not_told_of_python(tmp_path: Path) -> None:
+    (tmp_path / "old").write_text("")
+    answer = run("calibrate", CASE, "--out", tmp_path)
+    assert answer.exit_code == 2 and answer.stderr.rstrip().endswith("found old; choose another, or --force")
+
+
+def test_an_effect_is_found_by_what_it_means(tmp_path: Path) -> None:
+    answer = run("calibrate", CASE, "--out", tmp_path / "out", "--effects", "sun")
+    assert answer.exit_code == 2 and "it may be solar_gain (sun through the windows)" in answer.stderr
+
+
+def test_a_building_without_windows_is_said_loudly_before_it_is_calibrated(tmp_path: Path, capsys: Any) -> None:
+    from mpc.cli.options import open_case
+
+    folder = tmp_path / "dark"
+    shutil.copytree(CASE, folder)
+    content = yaml.safe_load((folder / "building.yaml").read_text(encoding="utf-8"))
+    assert open_case(folder, None, False) and capsys.readouterr().err == ""
+    (folder / "building.yaml").write_text(yaml.safe_dump(content | {"glazing": {}}), encoding="utf-8")
+    open_case(folder, None, False)
+    told = capsys.readouterr().err
+    assert told.startswith("warning: the building has no windows") and f"buildingmpc label {folder}" in told
+    answer = run("check", folder)
+    assert answer.exit_code == 0 and "the building has no windows" in answer.stdout
+
+
+def test_what_a_base_install_lacks_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    from mpc.cli import doctor
+
+    there = doctor._installed_packages()
+    gone = [p | ({"fine": False} if p["extra"] == "plan" else {}) for p in there]
+    monkeypatch.setattr(doctor, "_installed_packages", lambda: gone)
+    assert doctor.missing_extras("pages", "plan") == 'pip install "buildingmpc[pages,plan]"'
+    monkeypatch.setattr(doctor, "_installed_packages", lambda: [p | {"fine": True} for p in there])
+    assert doctor.missing_extras("pages", "plan") == ""
 
 
 def test_results_are_kept_unless_forced(calibrated: Path) -> None:

@@ -26,7 +26,7 @@ COMMAND = [sys.executable, "-m", "mpc.cli", "serve"]
 def running(*arguments: str) -> Iterator[tuple[dict[str, Any], subprocess.Popen[str]]]:
     """The command once it listens, with what it said."""
     process = subprocess.Popen(
-        [*COMMAND, "--boptest", "--port", "0", "--json", *arguments],
+        [*COMMAND, "--port", "0", "--json", *arguments],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -66,9 +66,7 @@ def test_the_bundled_case_is_served_until_it_is_interrupted() -> None:
 
 
 def test_what_is_refused() -> None:
-    with pytest.raises(BoptestError, match="say --boptest"):
-        serve()
     with pytest.raises(BoptestError, match="--allow-remote"):
-        serve(boptest=True, host="0.0.0.0")
+        serve(host="0.0.0.0")
     with pytest.raises(BoptestError, match="serve it alone"):
-        serve([Path("a"), Path("b")], boptest=True, parameters=Path("calibration.json"))
+        serve([Path("a"), Path("b")], parameters=Path("calibration.json"))

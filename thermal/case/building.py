@@ -12,6 +12,8 @@ from pydantic import BaseModel, ConfigDict, Field
 Text = Annotated[str, Field(strict=True, min_length=1)]
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
+#: Side of a cell of plans [m]: larger than most rooms at most.
+CellSize = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=100)]
 Azimuth = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-360, le=360)]
 Share = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0, le=1)]
 GeometryQuality = Literal["surveyed", "approximate", "generic"]
@@ -232,7 +234,7 @@ class BuildingFile(Entry):
     devices: tuple[Device, ...] = ()
     airflows: tuple[Airflow, ...] = ()
     weather_station: Text = "weather_station"
-    cell_size: Positive | None = None
+    cell_size: CellSize | None = None
     floors: tuple[FloorEntry, ...] | None = None
     glazing: dict[Text, dict[Text, Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0)]]] | None = None
     zones: tuple[ZoneEntry, ...] | None = None

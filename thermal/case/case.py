@@ -19,6 +19,7 @@ from thermal.case.points import OUTDOOR_TEMPERATURE, SUPPLY_FLOW, ZONE_TEMPERATU
 from thermal.case.quality import QualityReport, assess, usable
 from thermal.case.telemetry import Telemetry
 from thermal.case.validation import remarks
+from thermal.case.years import EXPECTED, FIRST_YEAR, LAST_YEAR
 from thermal.errors import CaseError
 
 
@@ -40,7 +41,7 @@ def local_timestamp(time: str | datetime, building: Building) -> pd.Timestamp:
     Raises
     ------
     CaseError
-        It is not ISO 8601, or a local time that the clock skips or shows twice.
+        It is not ISO 8601, of no year that stamps can lie in, or a local time that the clock skips or shows twice.
 
     Examples
     --------
@@ -56,6 +57,7 @@ def local_timestamp(time: str | datetime, building: Building) -> pd.Timestamp:
         stamp = pd.Timestamp(parsed)
         if pd.isna(stamp):
             raise ValueError("no time")
+        CaseError.unless(FIRST_YEAR <= stamp.year <= LAST_YEAR, "time", EXPECTED, repr(str(time)))
     except (TypeError, ValueError, OverflowError) as error:
         raise CaseError("time", "ISO 8601, such as 2023-07-06T07:10", repr(time)) from error
     if stamp.tzinfo is not None:

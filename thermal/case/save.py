@@ -20,6 +20,7 @@ from thermal.case.load import FORMAT, NAME, load_case
 from thermal.case.points import POINT_TYPES, split_column
 from thermal.case.telemetry import Telemetry
 from thermal.errors import CaseError
+from thermal.folders import check_writable
 from thermal.units import QUANTITIES, from_si
 
 TELEMETRY_FILE = "telemetry.parquet"
@@ -100,13 +101,15 @@ def check_target(target: Path, overwrite: bool) -> None:
     Raises
     ------
     CaseError
-        There is a file, or a folder that holds something and may not, or no case, to be replaced.
+        There is a file, or a folder that holds something and may not, or no case, to be replaced; or it cannot be
+        written to.
     """
+    check_writable(target if target.is_dir() else target.parent, CaseError)
     if not target.exists():
         return
     CaseError.unless(target.is_dir(), str(target), "a folder to make", "a file", "choose another path")
     if any(target.iterdir()):
-        advice = "choose another folder or pass overwrite=True"
+        advice = "choose another folder, or --force (overwrite=True)"
         CaseError.unless(overwrite, str(target), "no folder or an empty one", "a folder that holds files", advice)
         if not (target / NAME).is_file():
             raise CaseError(str(target), "a case to overwrite", f"a folder without {NAME}", "choose another folder")

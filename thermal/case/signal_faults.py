@@ -78,7 +78,7 @@ def impossible_values(values: FloatArray, point: PointType) -> list[Stretch]:
     list of tuple
         First and last position, and the most extreme value, of each stretch.
     """
-    bad = ~np.isnan(values) & ~((values >= point.lowest) & (values <= point.highest))
+    bad = ~np.isnan(values) & ~point.possible(values)
     found = []
     for first, last in runs(bad):
         stretch = values[first : last + 1]

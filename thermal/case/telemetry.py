@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from thermal.case.building import Location
 from thermal.case.points import POINT_TYPES, point_type, split_column
+from thermal.case.years import EXPECTED, shown, within_years
 from thermal.errors import CaseError
 from thermal.units import check_unit, to_si
 
@@ -106,6 +107,7 @@ def _checked_index(index: pd.Index, where: str) -> pd.DatetimeIndex:
     if index.hasnans:
         row = int(np.flatnonzero(index.isna())[0]) + 1
         raise CaseError(f"{where}: data row {row}", "a time stamp", "nothing", "drop the row")
+    _check_years(index, where)
     gaps = np.diff(index.as_unit("us").asi8)
     if (gaps <= 0).any():
         row = int(np.flatnonzero(gaps <= 0)[0]) + 1
@@ -114,6 +116,12 @@ def _checked_index(index: pd.Index, where: str) -> pd.DatetimeIndex:
             raise CaseError(at, "a new stamp", f"{index[row]} again", "drop or merge the row")
         raise CaseError(at, "stamps that go forwards", f"{index[row]} after {index[row - 1]}", "sort the rows")
     return index.as_unit("us")
+
+
+def _check_years(index: pd.DatetimeIndex, where: str) -> None:
+    wrong = np.flatnonzero(~within_years(index) & ~np.asarray(index.isna()))
+    if wrong.size:
+        raise CaseError(f"{where}: data row {wrong[0] + 1}", EXPECTED, shown(index, wrong[0]), "correct the stamp")
 
 
 def _regular_step(index: pd.DatetimeIndex, where: str) -> float:
@@ -174,6 +182,7 @@ def read_telemetry(
         raw = raw.loc[:, [str(column) in names for column in raw.columns]]
         raw = raw.set_axis([names[str(column)] for column in raw.columns], axis=1)
     if isinstance(raw.index, pd.DatetimeIndex) and raw.index.tz is not None:
+        _check_years(raw.index, path.name)
         raw = raw.tz_convert(location.timezone)
     columns = [str(column) for column in raw.columns]
     converted: dict[str, NDArray[np.float64]] = {}

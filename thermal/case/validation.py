@@ -248,6 +248,7 @@ def remarks(building: Building, telemetry: Telemetry) -> tuple[str, ...]:
     columns = {str(column) for column in telemetry.frame.columns}
     silent = [str(column) for column in telemetry.frame.columns if telemetry.frame[column].isna().all()]
     return (
+        *((NO_WINDOWS,) if not has_windows(building) else ()),
         *_on_plans(building),
         *_on_devices(building, columns),
         *_on_airflows(building, columns),
@@ -255,6 +256,28 @@ def remarks(building: Building, telemetry: Telemetry) -> tuple[str, ...]:
         *_on_entities(building, columns),
         *(f"column {column!r} never reports a value" for column in silent),
     )
+
+
+#: What is said of a building that has no window at all.
+NO_WINDOWS = (
+    "the building has no windows: without any, the model lets no sun in, and a calibration puts the sun's heat into "
+    "other parameters; give window-to-wall ratios on the page (buildingmpc label CASE, tab Building), or areas under "
+    "'glazing', or surfaces of kind 'window'"
+)
+
+
+def has_windows(building: Building) -> bool:
+    """Tell whether a building has glazing at all.
+
+    Parameters
+    ----------
+    building
+        With plans or a zone table.
+    """
+    geometry = building.geometry
+    if isinstance(geometry, FloorPlans):
+        return any(area > 0.0 for by_facade in geometry.glazing.values() for area in by_facade.values())
+    return any(surface.kind == "window" for surface in geometry.surfaces)
 
 
 def unknown_device_types(building: Building) -> dict[str, str]:

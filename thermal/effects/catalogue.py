@@ -91,16 +91,19 @@ def like(word: str) -> str:
 
     Examples
     --------
-    >>> like("meter"), like("solar")
+    >>> like("wind")
+    'it may be wind_film (wind on the outside of walls and windows) or infiltration (outdoor air that leaks in)'
+    >>> like("meter"), like("solar_gian")
     ('it may be flow_gain (a heat meter that reads wrong)', "the nearest valid one is 'solar_gain'")
     """
     asked = word.replace("_", " ").casefold().split()
-    parts = {e.id: f"{e.id.replace('_', ' ')} {e.title}".casefold().split() for e in CATALOGUE.values()}
-    meant = [
-        e for e, own in parts.items() if any(w == o or (len(w) > 3 and o.startswith(w)) for w in asked for o in own)
-    ]
     spelled = nearest(word, CATALOGUE)
-    if not meant or "nearest" in spelled:
+    if len(asked) > 1 and "nearest" in spelled:
+        return spelled
+    meant = [e.id for e in CATALOGUE.values() if e.is_meant_by(asked)]
+    if not meant and "nearest" not in spelled:
+        meant = [e.id for e in CATALOGUE.values() if e.is_meant_by(asked, begun=True)]
+    if not meant:
         return spelled
     *most, last = (f"{e} ({CATALOGUE[e].title})" for e in meant)
     return f"it may be {', '.join(most)} or {last}" if most else f"it may be {last}"

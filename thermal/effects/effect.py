@@ -70,6 +70,8 @@ class Effect:
     level : str
         Parameter that the effect's heat per unit of strength is linear in, so that what it is matters as much as the
         strength; empty where there is none.
+    keywords : tuple of str
+        Words that people look for it by, beside those of its id and title.
     """
 
     id: str
@@ -88,6 +90,20 @@ class Effect:
     shifts: tuple[str, ...] = ()
     level: str = ""
     roughly: bool = False
+    keywords: tuple[str, ...] = ()
+
+    def is_meant_by(self, words: Sequence[str], begun: bool = False) -> bool:
+        """Tell whether words may mean this effect: any of them is one of its own.
+
+        Parameters
+        ----------
+        words : sequence of str
+            In small letters.
+        begun : bool
+            Whether the first four letters or more of one of its words will do.
+        """
+        own = {*f"{self.id.replace('_', ' ')} {self.title}".casefold().split(), *self.keywords}
+        return any(w == o or (begun and len(w) > 3 and o.startswith(w)) for w in words for o in own)
 
     def untestable(self, inputs: InputProvider, anatomy: Anatomy) -> str | None:
         """Say why a case cannot tell whether the effect is there; None when it can.

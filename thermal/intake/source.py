@@ -87,7 +87,11 @@ def _read_text(file: Path) -> pd.DataFrame:
     with file.open(encoding="utf-8-sig") as stream:
         header = stream.readline()
     sign = max(",;\t", key=header.count)
-    return pd.read_csv(file, sep=sign, dtype=str, keep_default_na=False, encoding="utf-8-sig", skipinitialspace=True)
+    table = pd.read_csv(file, sep=sign, dtype=str, keep_default_na=False, encoding="utf-8-sig", skipinitialspace=True)
+    if not isinstance(table.index, pd.RangeIndex):  # pandas takes what is too much on the left for names of rows
+        found = f"rows with {table.index.nlevels + table.shape[1]}"
+        raise PlanError(file.name, f"rows with {table.shape[1]} cells, as in the header", found, "correct the header")
+    return table
 
 
 def _read_workbook(file: Path, table: str) -> pd.DataFrame:

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from thermal._types import BoolArray
+from thermal.case.years import EXPECTED, within_years
 from thermal.errors import PlanError
 
 _OFFSET = re.compile(r"(?:[zZ]|[+-]\d{2}:?\d{2})$")
@@ -75,13 +76,24 @@ def parse_stamps(cells: pd.Series, where: str) -> pd.Series:
     Returns
     -------
     Series
-        Times in UTC where all have an offset, without a zone where none has one; NaT where a cell says nothing.
+        Times in UTC where all have an offset, without a zone where none has one; NaT where a cell says nothing, or a
+        year that no stamp can lie in (`thermal.case.years`).
 
     Raises
     ------
     PlanError
         They are written in a way that could be read in two, or some have an offset and others none.
     """
+    stamps = _read(cells, where)
+    stamps = stamps.where(within_years(pd.DatetimeIndex(stamps)))
+    if stamps.isna().all():
+        advice = "write ISO 8601, such as 2023-07-06T07:10:00+02:00"
+        raise PlanError(where, f"a column of {EXPECTED}", repr(cells.iloc[0]) if len(cells) else "nothing", advice)
+    return stamps
+
+
+def _read(cells: pd.Series, where: str) -> pd.Series:
+    """Read times of any year."""
     if pd.api.types.is_datetime64_any_dtype(cells):
         return cells.dt.tz_convert("UTC") if cells.dt.tz is not None else cells
     numbers = pd.to_numeric(cells, errors="coerce")
@@ -96,13 +108,8 @@ def parse_stamps(cells: pd.Series, where: str) -> pd.Series:
         raise PlanError(where, "stamps that all have an offset, or none", f"{odd!r} among the others", "correct them")
     if len(given) and given.str.match(r"\d{4}-?\d{2}-?\d{2}").mean() > 0.5:
         everywhere = bool(len(with_offset) and with_offset.all())
-        stamps = pd.to_datetime(text, format="ISO8601", errors="coerce", utc=everywhere)
-    else:
-        stamps = pd.to_datetime(text, format=_local_format(given, where), errors="coerce")
-    if stamps.isna().all():
-        advice = "write ISO 8601, such as 2023-07-06T07:10:00+02:00"
-        raise PlanError(where, "a column of time stamps", repr(cells.iloc[0]), advice)
-    return stamps
+        return pd.to_datetime(text, format="ISO8601", errors="coerce", utc=everywhere)
+    return pd.to_datetime(text, format=_local_format(given, where), errors="coerce")
 
 
 def _local_format(given: pd.Series, where: str) -> str:

@@ -200,7 +200,7 @@ def first_fault(error: ValidationError, where: str) -> tuple[str, str, str]:
     """
     first = error.errors(include_url=False)[0]
     place = ".".join(str(part) for part in first["loc"]) or "content"
-    return f"{where}: {place}", first["msg"], repr(first["input"])[:80]
+    return f"{where}: {place}", first["msg"].removeprefix("Input should be "), repr(first["input"])[:80]
 
 
 def checked_number(value: object, name: str, lowest: float, highest: float, unit: str) -> float:

@@ -5,6 +5,7 @@ import zipfile
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any
 
 import numpy as np
@@ -330,7 +331,9 @@ def _read_csv(file: Path) -> NDArray[Any]:
 
 def _read_numpy(file: Path) -> NDArray[Any]:
     """Read an array, never an object that runs code, and nothing that unpacks to more than a plan."""
-    with reading(file, "a NumPy array of codes", EOFError, KeyError, zipfile.BadZipFile):
+    # a spoilt header is read as Python by NumPy: TokenError and SyntaxError
+    kinds = (EOFError, KeyError, SyntaxError, TokenError, zipfile.BadZipFile)
+    with reading(file, "a NumPy array of codes", *kinds):
         if file.suffix.lower() == ".npz":
             with zipfile.ZipFile(file) as archive:
                 unpacked = sum(entry.file_size for entry in archive.infolist())

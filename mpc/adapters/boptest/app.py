@@ -282,7 +282,7 @@ class Guard:
         origin, length = headers.get("origin"), headers.get("content-length", "0")
         if not self._knows(f"//{headers.get('host', '')}"):
             refusal = _status(403, "The Host header names no address of this server; serve with --name to allow it.")
-        elif origin is not None and not self._knows(origin):
+        elif (origin is not None and not self._knows(origin)) or headers.get("sec-fetch-site") == "cross-site":
             refusal = _status(403, "Pages of other sites may not use this server.")
         elif not length.isdecimal() or int(length) > LONGEST_BODY:
             refusal = _status(413, f"The body is longer than {LONGEST_BODY} bytes.")
@@ -296,7 +296,10 @@ class Guard:
         """Whether the host of an address, with or without a port, is this server's."""
         name = ""
         try:
-            name = urlsplit(url).hostname or ""
+            parts = urlsplit(url)
+            name = parts.hostname or ""
+            if "@" in parts.netloc or parts.path or parts.query or parts.fragment:  # neither header has any
+                return False
             return ipaddress.ip_address(name).is_loopback or self._remote
         except ValueError:
             return name in self._names

@@ -10,9 +10,8 @@ from typing import Self
 
 from mpc.adapters.boptest.case import BoptestCase
 from mpc.errors import BoptestError
+from thermal.plan.page.connections import connection_settings
 
-_KEEP_ALIVE = 75  # s: a controller that thinks for a while finds its connection open
-_MOST_CONNECTIONS = 512
 _START, _STOP = 30.0, 10.0  # s
 
 
@@ -69,7 +68,7 @@ class BoptestServer:
         app = Guard(create_app(self.tests), allow_remote, names)
         config = uvicorn.Config(
             app, log_config=None, log_level=logging.WARNING, access_log=False, lifespan="on", server_header=False,
-            timeout_keep_alive=_KEEP_ALIVE, limit_concurrency=_MOST_CONNECTIONS,
+            **connection_settings(),
         )  # fmt: skip
         self._server = uvicorn.Server(config)
         self._socket = _listen(host, port)

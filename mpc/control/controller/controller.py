@@ -9,7 +9,7 @@ import pandas as pd
 
 from mpc.control.controller.observer import Observer
 from mpc.control.controller.site import Action, ControllerSettings, Reading, SitePoints, Source
-from mpc.control.controller.watch import FarFromModel, StuckSensors, explain_comfort
+from mpc.control.controller.watch import FarFromModel, PossibleReadings, StuckSensors, explain_comfort
 from mpc.control.problem.assembly import DemandCount, Expected, expect
 from mpc.control.problem.horizon import HorizonData
 from mpc.control.problem.problem import ControlProblem
@@ -17,6 +17,8 @@ from mpc.control.solvers.solution import Solution, Solver, Starts, Status
 from mpc.errors import ControlError, MpcError
 from mpc.scenario.forecast import Forecast
 from thermal._types import FloatArray
+from thermal.case.points import possible_values
+from thermal.case.years import EXPECTED, shown, within_years
 
 Measured = Mapping[str, float]  # by ``ENTITY/POINT``
 _USUAL_HUMIDITY = 0.006  # kg/kg, as `thermal.components` has it where none is measured
@@ -73,6 +75,7 @@ class MpcController:
         self._known = _Known(self.settings.rule.setpoints(self._channels, 283.15))
         self._starts = Starts(self.settings.second_start)
         self._demand = DemandCount(self.settings.demand)
+        self._possible = PossibleReadings(self.points.columns)
         noise = np.sqrt(self.observer.kalman.whole.noise_variance)
         self._stuck = StuckSensors(self.points.zones, noise, self.settings.false_alarm, self.settings.resolution)
         self._far = FarFromModel(self.points.zones, self.observer.innovation_deviation)
@@ -96,16 +99,17 @@ class MpcController:
             Only in a first step that nothing tells the time of.
         """
         reasons: list[str] = []
-        stamp, solution = self._now(measurements, forecast, now), None
+        stamp, solution = self._now(measurements, forecast, now, reasons), None
+        seen = self._possible.update(measurements, stamp, reasons)
         try:
-            data = self._data(measurements, forecast, stamp, reasons)
+            data = self._data(seen, _possible(forecast, reasons), stamp, reasons)
         except MpcError as error:
             reasons.append(str(error))
         except (ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
             reasons.append(f"state or forecast could not be used: {error}")
         else:
             solution = self._solve(data, stamp, reasons)
-        values, source = self._choose(solution, stamp, measurements, reasons)
+        values, source = self._choose(solution, stamp, seen, reasons)
         self._known.previous = self._safe(values, reasons)
         named = self.points.setpoints(self._channels, self._known.previous, self.problem.predictor.hvac)
         return Action(named, source, tuple(reasons), solution, stamp)
@@ -152,10 +156,15 @@ class MpcController:
         ControlError.unless(started, "start-up: telemetry", "a zone that reports", "none that does")
         self._known.started, self._known.gains = True, steps[-1][3]
 
-    def _now(self, measurements: Measured, forecast: Forecast | None, now: pd.Timestamp | None) -> pd.Timestamp:
+    def _now(
+        self, measurements: Measured, forecast: Forecast | None, now: pd.Timestamp | None, reasons: list[str]
+    ) -> pd.Timestamp:
         given = now if now is not None else getattr(measurements, "stamp", None)
         if given is not None:
-            return pd.Timestamp(given)
+            stamp = pd.DatetimeIndex([given])
+            if stamp.tz is not None and within_years(stamp)[0]:
+                return pd.Timestamp(given)
+            reasons.append(f"the time of the step is {shown(stamp, 0)}, not one of {EXPECTED} in a time zone: not used")
         step = pd.Timedelta(seconds=self._horizon.control_step)
         if forecast is not None:
             index = forecast.table.index
@@ -291,6 +300,7 @@ class MpcController:
     def save_state(self) -> dict[str, Any]:
         """Everything that the next actions depend on, as plain values and arrays."""
         return {
+            "possible": dict(self._possible.memory),
             "known": vars(self._known).copy(), "estimate": self.observer.memory, "solver": self.solver.memory,
             "peaks": dict(self._demand.peaks), "windows": list(self._demand.windows), "stuck": self._stuck.memory,
             "far": self._far.count, "begun": self._starts.begun,
@@ -306,5 +316,17 @@ class MpcController:
         """
         self._known, self.observer.memory = _Known(**saved["known"]), saved["estimate"]
         self._stuck.memory, self._far.count, self._starts.begun = saved["stuck"], saved["far"], saved["begun"]
+        self._possible.memory = dict(saved["possible"])
         self._demand.peaks, self._demand.windows = dict(saved["peaks"]), list(saved["windows"])
         self.solver.memory = saved["solver"]
+
+
+def _possible(forecast: Forecast | None, reasons: list[str]) -> Forecast | None:
+    """Take out of a forecast what cannot be; it counts as missing."""
+    if forecast is None:
+        return None
+    kept = possible_values(forecast.table)
+    lost = forecast.table.notna() & kept.isna()
+    for column in forecast.table.columns[lost.any()]:
+        reasons.append(f"forecast of {column}: {int(lost[column].sum())} values that cannot be count as missing")
+    return Forecast(kept) if lost.any(axis=None) else forecast

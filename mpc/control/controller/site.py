@@ -21,10 +21,21 @@ from mpc.loop.actuators import STATIC_PRESSURE, SUPPLY_AIR, SUPPLY_WATER
 from mpc.scenario.forecast import Forecast
 from mpc.scenario.tariff import DemandCharge
 from thermal._types import FloatArray
-from thermal.case.points import OUTDOOR_TEMPERATURE, ZONE_TEMPERATURE
+from thermal.case.points import (
+    DISCHARGE_TEMPERATURE,
+    OUTDOOR_TEMPERATURE,
+    POINT_TYPES,
+    SUPPLY_FLOW,
+    ZONE_TEMPERATURE,
+    numbers,
+    possible_values,
+)
 from thermal.system.smooth import SmoothHvac
 from thermal.system.system import HvacSystem
 from thermal.units import AIR_HEAT_CAPACITY
+
+_OF_TERMINALS = (ZONE_TEMPERATURE, SUPPLY_FLOW, DISCHARGE_TEMPERATURE)
+_WATER = "supply_water_temperature_sensor"
 
 
 @dataclass(frozen=True)
@@ -53,6 +64,14 @@ class SitePoints:
     boiler: str
     weather_station: str
     meters: tuple[str, ...] = ()
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """All that `read` looks at, ``ENTITY/POINT``."""
+        terminals = [f"{name}/{point}" for point in _OF_TERMINALS for name in self.terminals]
+        zones = [f"{zone}/{ZONE_TEMPERATURE}" for zone in self.zones]
+        others = (f"{self.weather_station}/{OUTDOOR_TEMPERATURE}", f"{self.boiler}/{_WATER}")
+        return (*terminals, *zones, *others, *self.meters)
 
     def setpoints(self, channels: Sequence[Channel], values: FloatArray, hvac: SmoothHvac) -> dict[str, float]:
         """Spread the values of channels to the devices they belong to.
@@ -109,7 +128,7 @@ class SitePoints:
         place, n_zone = system.terminals.zone, len(self.zones)
         seen, flow, warm = (
             values_of(measurements, self.terminals, point)
-            for point in (ZONE_TEMPERATURE, "supply_air_flowrate_sensor", "discharge_air_temperature_sensor")
+            for point in _OF_TERMINALS
         )
         known = np.isfinite(seen)
         count, total = (np.bincount(place[known], weights, n_zone) for weights in (None, seen[known]))
@@ -119,7 +138,7 @@ class SitePoints:
         each = AIR_HEAT_CAPACITY * flow * (warm - zone[place])
         heat = np.asarray(np.bincount(place, each, n_zone), dtype=float)
         outdoor = float(values_of(measurements, [self.weather_station], OUTDOOR_TEMPERATURE)[0])
-        water = float(values_of(measurements, [self.boiler], "supply_water_temperature_sensor")[0])
+        water = float(values_of(measurements, [self.boiler], _WATER)[0])
         power = float(values_of(measurements, self.meters).sum())
         missing = [f"zone temperature of {z!r} is missing: its model goes on alone"
                    for z, t in zip(self.zones, zone, strict=True) if not np.isfinite(t)]  # fmt: skip
@@ -153,7 +172,7 @@ class SitePoints:
         step = index[1] - index[0] if len(index) > 1 else length
         if not len(index) or step > length or index[-1] - index[0] + step < length:
             raise ControlError("start-up: telemetry", f"a control step, {length}, or more", f"{len(index)} rows")
-        means = telemetry.resample(length, closed="right", label="right", origin=index[-1]).mean()
+        means = possible_values(telemetry).resample(length, closed="right", label="right", origin=index[-1]).mean()
         column = f"{self.weather_station}/{OUTDOOR_TEMPERATURE}"
         outdoor = means.reindex(columns=[column]).ffill().bfill().to_numpy()[:, 0]
         if np.isnan(outdoor).any():
@@ -207,7 +226,7 @@ class Reading(NamedTuple):
 
 
 def values_of(measurements: Mapping[str, float], entities: Sequence[str], point: str = "") -> FloatArray:
-    """Look a point of several entities up, shape (n_entity,) [library's units]; NaN where it is missing or no number.
+    """Look a point of several entities up, shape (n_entity,) [library's units]; NaN where it is missing or cannot be.
 
     Parameters
     ----------
@@ -219,8 +238,9 @@ def values_of(measurements: Mapping[str, float], entities: Sequence[str], point:
         What is measured.
     """
     columns = [f"{entity}/{point}" if point else entity for entity in entities]
-    found = pd.Series([measurements[c] if c in measurements else np.nan for c in columns], dtype=object)
-    return pd.to_numeric(found, errors="coerce").to_numpy(dtype=float)
+    found = numbers([measurements[c] if c in measurements else np.nan for c in columns])
+    kinds = [POINT_TYPES.get(column.rpartition("/")[2]) for column in columns]
+    return np.array([v if k is None or k.possible(v) else np.nan for k, v in zip(kinds, found, strict=True)])
 
 
 @dataclass(frozen=True)

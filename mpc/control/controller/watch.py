@@ -1,6 +1,6 @@
-"""What a controller notices: sensors that stand still, a building far from its model, comfort out of reach."""
+"""What a controller notices: readings that cannot be, stuck sensors, far from the model, comfort out of reach."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -11,13 +11,71 @@ from mpc.control.problem.problem import ControlProblem
 from mpc.control.solvers.solution import Solution
 from mpc.errors import ControlError
 from thermal._types import BoolArray, FloatArray
+from thermal.case.points import POINT_TYPES, numbers
 
+_RATE_SECONDS = 300.0  # s: over less time a rate says nothing, sensors lag and means jump
 _SAME = 1e-6  # K: readings that differ by less are one and the same
 _FEWEST = 6  # readings that must be the same, whatever the sensor
 _MOST = 288  # readings: a sensor that needs more to tell is not watched
 _FAR = 6.0  # deviations of an innovation
 _FAR_KELVIN = 1.0  # K: what is nearer than this is not worth saying
 _RESTART = 3  # steps in which most zones are far, after which the state is started anew
+
+
+class PossibleReadings:
+    """Takes readings that no sensor can give, or that moved faster than they can, for missing.
+
+    Parameters
+    ----------
+    columns : sequence of str
+        What is read, ``ENTITY/POINT``.
+
+    Notes
+    -----
+    Ranges and rates are those of the point types (`thermal.case.points.PointType`). A rate counts from the last reading
+    that was taken, over the time since; so a value that stays becomes possible again by itself.
+    """
+
+    def __init__(self, columns: Sequence[str]) -> None:
+        types = {column: POINT_TYPES.get(column.rpartition("/")[2]) for column in columns}
+        self._types = {column: kind for column, kind in types.items() if kind is not None}
+        #: Last reading that was taken of each column that has a rate, and when [unit inside the library, stamp].
+        self.memory: dict[str, tuple[float, pd.Timestamp]] = {}
+
+    def update(self, measurements: Mapping[str, float], now: pd.Timestamp, reasons: list[str]) -> dict[str, float]:
+        """Take in a step's readings; give them without those that cannot be, and say which.
+
+        Parameters
+        ----------
+        measurements : mapping of str to float
+            By ``ENTITY/POINT`` [library's units].
+        now : pandas.Timestamp
+            End of the step.
+        reasons : list of str
+            Where it is said.
+        """
+        kept, read = dict(measurements), [column for column in self._types if column in measurements]
+        for column, value in zip(read, numbers([measurements[column] for column in read]).tolist(), strict=True):
+            if trouble := self._trouble(column, value, now):
+                kept[column] = np.nan
+                reasons.append(f"{column}: {trouble}: it counts as missing")
+        return kept
+
+    def _trouble(self, column: str, value: float, now: pd.Timestamp) -> str:
+        """Say what is wrong with a reading; nothing where it can be."""
+        kind = self._types[column]
+        if np.isnan(value):
+            return ""
+        if not kind.possible(value):
+            return f"{kind.told(value)} is outside of {kind.told(kind.lowest)} to {kind.told(kind.highest)}"
+        last, when = self.memory.get(column, (value, now))
+        elapsed = max((now - when).total_seconds(), _RATE_SECONDS)
+        if abs(value - last) > kind.largest_rate * elapsed / 3600.0:
+            before = f"{kind.told(last)} {elapsed / 60.0:.0f} min before"
+            return f"{kind.told(value)} after {before} is faster than it can move"
+        if np.isfinite(kind.largest_rate):
+            self.memory[column] = (value, now)
+        return ""
 
 
 class StuckSensors:

@@ -193,3 +193,10 @@ def test_horizon_data_are_plain_parameters(controller, make_data, monkeypatch, m
     controller.step(seen, ahead(make_forecast, 1))
     assert not built
     assert isinstance(make_data(controller.problem), HorizonData)
+
+
+@pytest.mark.parametrize("odd", [pd.NaT, pd.Timestamp("2023-01-16 06:00"), pd.Timestamp("1500-01-01", tz="UTC")])
+def test_a_time_that_cannot_be_is_said_and_not_used(controller, modes, points, make_forecast, odd) -> None:
+    action = controller.step(Twin(modes, len(points.zones)).measure(points), ahead(make_forecast, 0), odd)
+    assert action.stamp == START and action.source is Source.OPTIMAL
+    assert any("not one of time stamps of the years 1900 to 2199 in a time zone" in r for r in action.reasons)

@@ -21,6 +21,7 @@ from mpc.control.problem.horizon import Horizon
 from mpc.control.solvers.sequential import SequentialSolver
 from mpc.control.solvers.solution import Status
 from mpc.control.solvers.uncertainty import BackOff
+from mpc.scenario.forecast import Forecast
 
 START = pd.Timestamp("2023-01-16 07:00", tz="Etc/GMT+8")
 STEPS, FAULT = 15, 3  # of 5 minutes, and the step from which on there is a fault
@@ -119,6 +120,45 @@ def test_a_lost_sensor(run, points) -> None:
     site, actions = run(lambda controller, site, seen, forecast: (seen | {name: np.nan}, forecast))
     assert said(actions, f"zone temperature of {points.zones[1]!r} is missing") == STEPS - FAULT
     assert discomfort(site) < 0.2
+
+
+OUTDOOR, WATER = "weather_station/outside_air_temperature_sensor", "BOILER/supply_water_temperature_sensor"
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        (OUTDOOR, 0.0, "-273.15 degC is outside of -80 degC to 65 degC: it counts as missing"),
+        (WATER, 1e12, "1e+12 degC is outside of -20 degC to 180 degC: it counts as missing"),
+        (OUTDOOR, 300.0, "min before is faster than it can move: it counts as missing"),
+        ("AHU/electrical_power_sensor", -1e20, "is outside of -1e+07 W to 1e+08 W: it counts as missing"),
+    ],
+)
+def test_what_no_sensor_can_read_is_said_and_counts_as_missing(run, name: str, value: float, words: str) -> None:
+    """As if the sensor had not reported at all: the same setpoints, and the reason on top."""
+    site, actions = run(lambda controller, site, seen, forecast: (seen | {name: value}, forecast))
+    _, missing = run(lambda controller, site, seen, forecast: (seen | {name: np.nan}, forecast))
+    assert said(actions, f"{name}: ") == said(actions, words) > 0
+    first = [a.setpoints for a in actions[: FAULT + 2]]
+    assert first == [a.setpoints for a in missing[: FAULT + 2]]
+    assert discomfort(site) < 0.2
+
+
+def test_a_value_that_stays_is_possible_again(run) -> None:
+    """A front brought it: after a quarter of an hour the rate allows 24 K, and the sensor is believed."""
+    _, actions = run(lambda controller, site, seen, forecast: (seen | {OUTDOOR: 300.0}, forecast))
+    assert [k for k in range(STEPS) if said(actions[k : k + 1], "faster than")] == [FAULT, FAULT + 1]
+
+
+def test_a_forecast_that_cannot_be(run) -> None:
+    def fault(controller, site, seen, forecast):
+        table = forecast.to_frame()
+        table.iloc[5:8, table.columns.get_loc("outside_air_temperature_sensor")] = 1e9
+        return seen, Forecast(table)
+
+    _, actions = run(fault)
+    assert said(actions, "forecast of outside_air_temperature_sensor: 3 values that cannot be") == STEPS - FAULT
+    assert all(action.source is Source.OPTIMAL for action in actions)
 
 
 def test_a_late_forecast(run) -> None:

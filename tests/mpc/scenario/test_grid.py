@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mpc.errors import ScenarioError
-from mpc.scenario.grid import Calendar, StepGrid
+from mpc.scenario.grid import Calendar, StepGrid, regular_steps
 from thermal import Building
 from thermal.errors import CaseError
 
@@ -71,3 +71,10 @@ def test_what_is_no_grid_is_refused(building: Building) -> None:
         StepGrid.between("2023-07-04", "2023-07-03", 300.0, building)
     with pytest.raises(CaseError, match="clocks of America/Los_Angeles show once"):
         StepGrid.between("2023-03-12 02:30", "2023-03-13", 300.0, building)
+
+
+@pytest.mark.parametrize("odd", ["9999-12-31T23:50", "1500-01-01", "NaT"])
+def test_stamps_of_years_that_no_stamp_can_lie_in(odd: str) -> None:
+    stamps = pd.DatetimeIndex(np.array(["2023-01-01", odd], dtype="datetime64[us]")).tz_localize("UTC")
+    with pytest.raises(ScenarioError, match="weather: row 2: expected time stamps of the years 1900 to 2199, found"):
+        regular_steps(stamps, "weather", ScenarioError)

@@ -91,7 +91,7 @@ def test_slice_saves_with_what_it_holds(plan_draft: Any, tmp_path: Path) -> None
 def test_folder_that_holds_something_is_refused(plan_draft: Any, tmp_path: Path) -> None:
     case = load_case(plan_draft.write())
     before = {path.name: path.read_bytes() for path in plan_draft.folder.iterdir()}
-    with pytest.raises(CaseError, match=r"expected no folder or an empty one.*pass overwrite=True"):
+    with pytest.raises(CaseError, match=r"expected no folder or an empty one.*--force"):
         save_case(case, plan_draft.folder)
     assert {path.name: path.read_bytes() for path in plan_draft.folder.iterdir()} == before
     (tmp_path / "empty").mkdir()
@@ -183,3 +183,11 @@ def test_telemetry_without_a_time_zone_is_not_saved(tmp_path: Path) -> None:
     assert not (tmp_path / "case").exists()
     with pytest.raises(CaseError):
         Telemetry.from_frame(frame)
+
+
+@pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="needs a file system that is not for files")
+def test_a_place_that_cannot_be_written_to_is_named(plan_draft: Any) -> None:
+    case = load_case(plan_draft.write())
+    for target in ("/proc/case", "/proc/deep/case"):
+        with pytest.raises(CaseError, match="expected a place that can be written to, found /proc: "):
+            save_case(case, target)

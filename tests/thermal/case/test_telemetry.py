@@ -375,3 +375,16 @@ def test_entity_with_a_slash(plan_draft: Any) -> None:
     plan_draft.content["devices"].append({"name": "floor 1/VAV", "type": "vav", "zone": "A"})
     plan_draft.frame["floor 1/VAV/supply_air_flowrate_sensor"] = 0.0
     assert (load_case(plan_draft.write()).zone_heat()["A"] != 0.0).all()
+
+
+@pytest.mark.parametrize("odd", ["9999-12-31T23:50:00", "2200-01-01T00:00:00", "1677-09-21T00:00:00", "0001-01-01T00:00:00"])
+def test_stamps_of_years_that_no_stamp_can_lie_in(plan_draft: Any, odd: str) -> None:
+    message = f"data row 48: expected time stamps of the years 1900 to 2199, found {odd}"
+    path, lines = csv_lines(plan_draft)
+    path.write_text("\n".join([*lines[:-1], f"{odd}+00:00," + lines[-1].partition(",")[2]]))
+    with pytest.raises(CaseError, match=message):
+        load_case(path.parent)
+    stamps = np.append(plan_draft.frame.index.tz_localize(None).to_numpy("datetime64[us]")[:-1], np.datetime64(odd))
+    plan_draft.content["telemetry"] = "telemetry.parquet"
+    plan_draft.frame.index = pd.DatetimeIndex(stamps, name="timestamp").tz_localize("UTC")
+    refused(plan_draft, CaseError, message)

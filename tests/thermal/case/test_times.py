@@ -85,3 +85,9 @@ def test_slice_of_no_time(case: Case) -> None:
 
 def test_date_is_not_a_text(case: Case) -> None:
     assert local_timestamp(date(2023, 3, 1), case.building).isoformat() == "2023-03-01T00:00:00-06:00"  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("time", ["9999-12-31T23:50", "0001-01-01", "1677-09-20T00:00Z", datetime(2200, 1, 1)])
+def test_a_year_that_no_stamp_can_lie_in(case: Case, time: str | datetime) -> None:
+    with pytest.raises(CaseError, match="time: expected time stamps of the years 1900 to 2199, found"):
+        local_timestamp(time, case.building)

@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 from thermal.case.load import load_case
+from thermal.case.validation import NO_WINDOWS
 from thermal.errors import CaseError
 
 Speller = Callable[..., str]
@@ -286,3 +287,11 @@ def test_one_zone_and_no_devices_are_valid(table_draft: Any) -> None:
     case = load_case(table_draft.write())
     assert case.building.zone_names == ("room",)
     assert (case.zone_heat() == 0.0).all().all()
+
+
+def test_a_building_without_windows_is_said_to_have_none(plan_draft: Any, table_draft: Any) -> None:
+    assert NO_WINDOWS not in load_case(plan_draft.write()).remarks
+    plan_draft.content["glazing"] = {}
+    assert load_case(plan_draft.write()).remarks[0] == NO_WINDOWS
+    table_draft.content["surfaces"] = [s for s in table_draft.content["surfaces"] if s["kind"] != "window"]
+    assert load_case(table_draft.write()).remarks[0] == NO_WINDOWS

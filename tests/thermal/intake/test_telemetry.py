@@ -211,6 +211,8 @@ def test_a_logger_that_does_not_change_its_clock_is_named(house: Path, tmp_path:
     ("change", "settings", "error", "text"),
     [
         ({"time": "yesterday"}, {}, PlanError, "time stamps"),
+        ({"time": "1500-01-01T10:00:00Z"}, {}, PlanError, "the years 1900 to 2199"),
+        ({"time": "9999-12-31T23:50:00-05:00"}, {}, PlanError, "the years 1900 to 2199"),
         ({"time": "03/04/2023 10:00"}, {"timezone": "UTC"}, PlanError, "read in one way"),
         ({}, {"step": 7.0}, CaseError, "divides a day"),
         ({}, {"step": 7 * 3600.0}, CaseError, "--resample"),

@@ -9,6 +9,7 @@ from pydantic import Field, ValidationError
 
 from thermal.case.building import PLAN_TOKENS as BASIC
 from thermal.case.building import Airflow, Building, Device, Entry, FloorPlan, FloorPlans, GeometryQuality, Location
+from thermal.case.plan import facade_areas
 from thermal.errors import LabelError
 from thermal.plan.drawing import Finite
 from thermal.plan.guard import first_fault
@@ -145,7 +146,9 @@ class Draft(Entry):
     devices
         In the order of the case.
     glazing
-        Glazed area [m2] by zone and facade.
+        Glazed area [m2] by zone and facade, where it is not what `glazing_ratio` says.
+    glazing_ratio
+        Glazed share of facades, 0 to 1 [-]: by floor (empty: of the whole building), then by facade (empty: of all).
     airflows
         As in a case.
     weather_station
@@ -161,10 +164,11 @@ class Draft(Entry):
     name: Name
     site: Site = Site()
     orientation: Finite = 0.0
-    cell_size: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 0.5
+    cell_size: Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)] = 0.5
     floors: Annotated[tuple[DraftFloor, ...], Field(max_length=_MOST_FLOORS)] = ()
     devices: Annotated[tuple[DraftDevice, ...], Field(max_length=_MOST_DEVICES)] = ()
     glazing: dict[Name, dict[Name, Finite]] = Field(default_factory=dict)
+    glazing_ratio: dict[Name, dict[Name, Finite]] = Field(default_factory=dict)
     airflows: tuple[Airflow, ...] = ()
     weather_station: Name = "weather_station"
     geometry_quality: GeometryQuality = "approximate"
@@ -244,7 +248,10 @@ def parse_draft(content: Any, where: str) -> Draft:
 
 
 def _check_runs(floor: DraftFloor, where: str) -> None:
-    runs = np.asarray(floor.runs, dtype=np.float64)  # an integer of any size
+    try:
+        runs = np.asarray(floor.runs, dtype=np.float64)  # an integer of any size
+    except OverflowError as error:
+        raise LabelError(where, "runs of all cells, within the legend", "an integer of over 300 digits") from error
     if floor.rows * floor.columns > _MOST_CELLS:
         raise LabelError(where, f"at most {_MOST_CELLS} cells", f"{floor.rows} x {floor.columns}")
     if floor.legend[: len(BASIC)] != BASIC or len(set(floor.legend)) < len(floor.legend):
@@ -308,16 +315,40 @@ def building_of_draft(draft: Draft) -> Building:
     floors = tuple(FloorPlan(floor.name, floor.height, floor.tokens) for floor in draft.floors)
     return Building(
         location=Location.model_validate(draft.site.model_dump()),
-        geometry=FloorPlans(draft.cell_size, floors, _glazing(draft.glazing)),
+        geometry=FloorPlans(draft.cell_size, floors, glazed_areas(draft)),
         devices=tuple(Device(name=d.name, type=d.type, zone=d.zone, fed_by=d.fed_by) for d in draft.devices),
         **{key: getattr(draft, key) for key in _SHARED},
     )
 
 
-def _glazing(glazing: Mapping[str, Mapping[str, float]]) -> dict[str, dict[str, float]]:
-    """Leave out facades without glass."""
-    kept = {zone: {side: area for side, area in by_facade.items() if area} for zone, by_facade in glazing.items()}
+def glazed_areas(draft: Draft) -> dict[str, dict[str, float]]:
+    """Find the glazed areas of zones: their own, else what the ratio of their floor or of the building gives.
+
+    Parameters
+    ----------
+    draft : Draft
+        What is on the page.
+
+    Returns
+    -------
+    dict
+        Area by zone and facade [m2]; facades without glass are left out.
+    """
+    found = {zone: dict(own) for zone, own in draft.glazing.items()}
+    for floor in draft.floors if draft.glazing_ratio else ():
+        plans = FloorPlans(draft.cell_size, (FloorPlan(floor.name, floor.height, floor.tokens),))
+        for zone, facades in facade_areas(plans).items() if floor.rows * floor.columns else ():
+            for side, area in facades.items():
+                glass = round(_ratio(draft.glazing_ratio, floor.name, side) * area, 2)
+                found.setdefault(zone, {}).setdefault(side, glass)
+    kept = {zone: {side: area for side, area in by_facade.items() if area} for zone, by_facade in found.items()}
     return {zone: by_facade for zone, by_facade in kept.items() if by_facade}
+
+
+def _ratio(ratios: Mapping[str, Mapping[str, float]], floor: str, side: str) -> float:
+    """Ratio of a facade of a floor, the nearest that is given: floor before building, facade before all [-]."""
+    given = (ratios.get(where, {}).get(which) for where in (floor, "") for which in (side, ""))
+    return next((ratio for ratio in given if ratio is not None), 0.0)
 
 
 def zones_of(floors: Sequence[DraftFloor]) -> dict[str, list[str]]:

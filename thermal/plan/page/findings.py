@@ -14,10 +14,17 @@ from scipy import ndimage
 
 from thermal.case.building import INTERIOR_WALL, PLAN_TOKENS, FloorPlan, FloorPlans, Location
 from thermal.case.plan import check_plan, facade_areas, zone_floor_areas
-from thermal.case.validation import GLAZING_TOLERANCE, RESERVED, TERMINAL_TYPES, check_building, check_columns
+from thermal.case.validation import (
+    GLAZING_TOLERANCE,
+    RESERVED,
+    TERMINAL_TYPES,
+    check_building,
+    check_columns,
+    has_windows,
+)
 from thermal.components.registry import device_types
 from thermal.errors import CaseError, nearest
-from thermal.plan.page.draft import Draft, DraftFloor, building_of_draft, zones_of
+from thermal.plan.page.draft import Draft, DraftFloor, building_of_draft, glazed_areas, zones_of
 
 _PLACE = re.compile(r"(?<!')\b(row|column) (\d+)")  # of a cell, not in the name of a zone
 
@@ -50,6 +57,11 @@ class DraftFinding:
 _error, _remark = partial(DraftFinding, "error"), partial(DraftFinding, "remark")
 
 
+NO_GLAZING = (
+    "the building has no windows: without any, the model lets no sun in; give window-to-wall ratios on the tab Building"
+)
+
+
 def find_faults(draft: Draft, columns: Sequence[str] = (), telemetry: str = "telemetry") -> tuple[DraftFinding, ...]:
     """Check a draft, object by object, and then as a whole.
 
@@ -73,6 +85,8 @@ def find_faults(draft: Draft, columns: Sequence[str] = (), telemetry: str = "tel
             building = building_of_draft(draft)
             check_building(building)
             check_columns(building, columns, telemetry)
+            if not has_windows(building):
+                found.append(_remark("case", draft.name, NO_GLAZING))
         except CaseError as error:
             found.append(_error("case", draft.name, str(error)))
     return tuple(sorted(found, key=lambda finding: finding.level != "error"))
@@ -89,15 +103,17 @@ def zone_facts(draft: Draft) -> dict[str, dict[str, Any]]:
     Returns
     -------
     dict
-        Floor area and area of each facade [m2], by zone.
+        Floor area, area of each facade, and glazed area of each [m2], by zone.
     """
+    glass = glazed_areas(draft)
     facts: dict[str, dict[str, Any]] = {}
     for floor in draft.floors:
         if not floor.rows * floor.columns:
             continue
         plans = FloorPlans(draft.cell_size, (FloorPlan(floor.name, floor.height, floor.tokens),))
         facades = facade_areas(plans)
-        facts |= {zone: {"area": area, "facades": facades[zone]} for zone, area in zone_floor_areas(plans).items()}
+        for zone, area in zone_floor_areas(plans).items():
+            facts[zone] = {"area": area, "facades": facades[zone], "glazing": glass.get(zone, {})}
     return facts
 
 
@@ -159,6 +175,12 @@ def _on_zones(draft: Draft) -> Iterator[DraftFinding]:
 
 
 def _on_glazing(draft: Draft, places: dict[str, list[str]]) -> Iterator[DraftFinding]:
+    for floor, by_facade in draft.glazing_ratio.items():
+        for facade, ratio in by_facade.items():
+            if not 0.0 <= ratio <= 1.0:
+                where = f"{floor or 'the whole building'}, {facade or 'all facades'}"
+                text = f"window-to-wall ratio of {where}: expected 0 to 100 %, found {100.0 * ratio:g} %"
+                yield _error("case", floor, text)
     facts = zone_facts(draft) if draft.glazing else {}
     for zone, by_facade in draft.glazing.items():
         if zone not in places:

@@ -3,6 +3,7 @@
 import json
 from dataclasses import asdict
 from importlib.resources import files
+from pathlib import Path
 from typing import Annotated, Any
 
 from fastapi import FastAPI, Query, Request
@@ -107,6 +108,13 @@ def _add_drawings(app: FastAPI, desk: LabelDesk) -> None:
     own = desk.store.own
     seen: dict[tuple[str, int], dict[str, Any]] = {}
 
+    def drawing_of(name: str) -> Path:
+        """Find a drawing by its name alone: no folder, no path, none that is not there."""
+        file = inside_folder(own / "drawings", name, "drawing")
+        there = file.is_file() and file.parent == (own / "drawings").resolve()
+        PlanError.unless(there, "drawing", "the name of one on the page", repr(name[:80]))
+        return file
+
     @app.get("/api/drawings")
     def list_drawings() -> dict[str, Any]:
         files_there = sorted(p for p in (own / "drawings").iterdir() if p.is_file() and p.name[0] != ".")
@@ -122,7 +130,7 @@ def _add_drawings(app: FastAPI, desk: LabelDesk) -> None:
     @app.delete("/api/drawings/{name}")
     def drop_drawing(name: str, window: Window) -> dict[str, Any]:
         desk.sessions.check(window)
-        inside_folder(own / "drawings", name, "drawing").unlink(missing_ok=True)
+        drawing_of(name).unlink()
         return {}
 
     @app.post("/api/drawings")
@@ -135,7 +143,7 @@ def _add_drawings(app: FastAPI, desk: LabelDesk) -> None:
 
     @app.get("/api/drawings/{name}")
     def show_drawing(name: str, page: int = 1, dots_per_inch: float = DOTS_PER_INCH) -> Response:
-        file = inside_folder(own / "drawings", name, "drawing")
+        file = drawing_of(name)
         PlanError.unless(file.suffix.lower() in RASTER_KINDS, file.name, "a raster drawing", repr(file.suffix))
         sheet = look_at(file, page, dots_per_inch)
         picture = png_of(read_drawing(file, page=page, dots_per_inch=dots_per_inch).grey, WIDEST_PICTURE)
@@ -240,7 +248,8 @@ async def _malformed(request: Request, error: Exception) -> Response:
     first = error.errors()[0] if isinstance(error, RequestValidationError) else {}
     where = ".".join(str(part) for part in first.get("loc", ("request",)))
     found = repr(first.get("input"))[:80]
-    return await _named(request, LabelError(where, str(first.get("msg", "a valid value")), found))
+    expected = str(first.get("msg", "a valid value")).removeprefix("Input should be ")
+    return await _named(request, LabelError(where, expected, found))
 
 
 def _parse_json(body: bytes) -> Any:

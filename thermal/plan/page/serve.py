@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from thermal.errors import LabelError, describe
 from thermal.plan.guard import extra
+from thermal.plan.page.connections import connection_settings
 from thermal.plan.page.desk import LabelDesk
 
 if TYPE_CHECKING:
@@ -91,7 +92,8 @@ class Gate:
         origin, site = headers.get("origin"), headers.get("sec-fetch-site", "none")
         if origin not in (None, f"http://{host}"):
             return 403, describe("origin", f"the page itself, http://{host}", repr(str(origin)[:80]))
-        if scope["method"] not in _READING and site not in ("same-origin", "none"):
+        opened = scope["method"] in _READING and headers.get("sec-fetch-mode", "navigate") == "navigate"
+        if not opened and site not in ("same-origin", "none"):
             return 403, describe("request", "one that the page itself makes", f"one that is {site[:20]}")
         return None
 
@@ -125,14 +127,14 @@ def serve_page(desk: LabelDesk, *, port: int = 0, ready: Callable[[str], None] |
     MissingExtraError
         The extra ``[pages]`` is not installed.
     """
-    uvicorn = extra("uvicorn", "pages", "labelling page")
+    uvicorn = extra("uvicorn", "pages,plan", "labelling page")
     token = secrets.token_urlsafe(24)
     try:
         app = create_app(desk, token)
         listener = _listen(port)
         address = f"http://{HOST}:{listener.getsockname()[1]}/{token}/"
         quiet: dict[str, Any] = {"log_level": "critical", "access_log": False, "lifespan": "off"}
-        server = uvicorn.Server(uvicorn.Config(app, timeout_graceful_shutdown=2, **quiet))
+        server = uvicorn.Server(uvicorn.Config(app, timeout_graceful_shutdown=2, **quiet, **connection_settings()))
         if ready is not None:
             threading.Thread(target=_when_ready, args=(server, ready, address), daemon=True).start()
         server.run(sockets=[listener])
@@ -162,7 +164,7 @@ def create_app(desk: LabelDesk, token: str) -> ASGIApp:
     MissingExtraError
         The extra ``[pages]`` is not installed.
     """
-    extra("fastapi", "pages", "labelling page")
+    extra("fastapi", "pages,plan", "labelling page")
     from thermal.plan.page.routes import routes_of
 
     return Gate(routes_of(desk), token)

@@ -15,6 +15,7 @@ from thermal.case.building import BuildingFile
 from thermal.case.load import NAME, load_case, migrate, read_building_file
 from thermal.case.telemetry import check_units, read_telemetry
 from thermal.errors import CaseError, LabelError, SessionHeldError, ThermalError
+from thermal.folders import check_writable
 from thermal.plan.folder import DRAFT, OWN_FOLDER, save_plan_case
 from thermal.plan.guard import inside_folder
 from thermal.plan.match import read_columns
@@ -59,7 +60,7 @@ class CaseStore:
     Raises
     ------
     LabelError
-        It holds something that is no case, a case with a zone table, or a damaged draft.
+        It holds something that is no case, a case with a zone table, or a damaged draft; or it cannot be written to.
     CaseError
         One of its family: the case that is there cannot be read.
     """
@@ -68,6 +69,7 @@ class CaseStore:
         self.folder = Path(path).absolute()
         if self.folder.exists() and not self.folder.is_dir():
             raise LabelError(str(path), "a case folder", "a file")
+        check_writable(self.folder, LabelError)
         own = self.own = self.folder / OWN_FOLDER
         is_case = (self.folder / NAME).is_file()
         if self.folder.is_dir() and any(self.folder.iterdir()) and not is_case and not own.is_dir():

@@ -135,7 +135,12 @@ def test_a_body_too_long_is_refused(http: httpx.Client, testid: str) -> None:
         ({"origin": "http://evil.example"}, 403),
         ({"origin": "null"}, 403),
         ({"origin": "http://[::1"}, 403),
+        ({"origin": "http://evil.com@127.0.0.1"}, 403),
+        ({"origin": "http://evil.com@localhost:3000"}, 403),
+        ({"host": "evil.com@127.0.0.1"}, 403),
         ({"origin": "http://localhost:3000"}, 200),
+        ({"sec-fetch-site": "cross-site"}, 403),
+        ({"sec-fetch-site": "same-origin"}, 200),
     ],
 )
 def test_other_names_and_pages_of_other_sites_are_refused(

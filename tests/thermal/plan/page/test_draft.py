@@ -14,7 +14,15 @@ from hypothesis import strategies as st
 from thermal import Building, ZoneTable
 from thermal.case.building import Location, ZoneEntry
 from thermal.errors import LabelError
-from thermal.plan.page.draft import Draft, building_of_draft, draft_of, encode_floor, parse_draft, zones_of
+from thermal.plan.page.draft import (
+    Draft,
+    building_of_draft,
+    draft_of,
+    encode_floor,
+    glazed_areas,
+    parse_draft,
+    zones_of,
+)
 
 
 @given(
@@ -80,3 +88,24 @@ def test_zones_are_those_in_use() -> None:
     first = encode_floor("F1", 3.0, np.array([["A", "+", "B"]]))
     second = encode_floor("F2", 3.0, np.array([["A", ".", "."]]))
     assert zones_of([first, second]) == {"A": ["F1", "F2"], "B": ["F1"]}
+
+
+@pytest.mark.parametrize(
+    ("ratio", "own", "expected"),
+    [
+        ({"": {"": 0.5}}, {}, {"north": 2.25, "south": 2.25, "west": 3.0}),
+        ({"": {"": 0.5, "north": 0.0}}, {}, {"south": 2.25, "west": 3.0}),
+        ({"": {"": 0.5, "north": 0.1}, "F1": {"": 0.2}}, {}, {"north": 0.9, "south": 0.9, "west": 1.2}),
+        ({"": {"": 0.5}, "F1": {"west": 0.25}}, {}, {"north": 2.25, "south": 2.25, "west": 1.5}),
+        ({"": {"": 0.5}, "F9": {"": 1.0}}, {}, {"north": 2.25, "south": 2.25, "west": 3.0}),
+        ({"": {"": 0.5}}, {"north": 1.0, "west": 0.0}, {"north": 1.0, "south": 2.25}),
+        ({}, {"north": 1.0, "west": 0.0}, {"north": 1.0}),
+    ],
+)
+def test_the_nearest_ratio_counts_and_a_zone_overrides_it(
+    draft_with: Callable[..., Draft], ratio: Any, own: Any, expected: dict[str, float]
+) -> None:
+    """Zone A: 1.5 m of facade to the north and south and 2 m to the west, 3 m high."""
+    draft = draft_with(glazing_ratio=ratio, glazing={"A": own} if own else {})
+    assert glazed_areas(draft)["A"] == pytest.approx(expected)
+    assert building_of_draft(draft).geometry.glazing["A"] == pytest.approx(expected)

@@ -21,7 +21,15 @@ def errors(draft: Draft, columns: tuple[str, ...] = ()) -> set[tuple[str, str]]:
 
 
 def test_a_finished_draft_has_no_fault(draft_with: Make) -> None:
-    assert find_faults(draft_with()) == ()
+    assert find_faults(draft_with(glazing_ratio={"": {"": 0.3}})) == ()
+
+
+def test_a_building_without_windows_is_told(draft_with: Make) -> None:
+    (found,) = find_faults(draft_with())
+    assert (found.level, found.kind) == ("remark", "case") and "the building has no windows" in found.message
+    for given in ({"glazing": {"A": {"west": 1.0}}}, {"glazing_ratio": {"F1": {"west": 0.2}}}):
+        assert find_faults(draft_with(**given)) == ()
+    assert len(find_faults(draft_with(glazing_ratio={"": {"": 0.0}}))) == 1
 
 
 def test_each_faulty_zone_is_told_apart_with_its_place(draft_with: Make) -> None:
@@ -56,6 +64,7 @@ def test_places_are_counted_from_the_first_cell_of_the_plan(draft_with: Make) ->
         ({"glazing": {"A": {"west": 7.0}}}, {("zone", "A")}),
         ({"glazing": {"A": {"up": 1.0}}}, {("zone", "A")}),
         ({"glazing": {"C": {"west": 1.0}}}, {("case", "C")}),
+        ({"glazing_ratio": {"": {"west": 1.5}, "F1": {"": -0.1}}}, {("case", ""), ("case", "F1")}),
         ({"airflows": (Airflow(source="A", target="B", device="spam", fraction=0.5),)}, {("case", "two rooms")}),
     ],
 )  # fmt: skip
@@ -71,7 +80,8 @@ def test_telemetry_of_something_renamed_is_told(draft_with: Make) -> None:
 def test_what_is_worth_a_look_is_no_error(draft_with: Make) -> None:
     devices = (VAV.model_copy(update={"zone": None}), DraftDevice(name="X", type="lamp", zone="B"))
     found = {(f.kind, f.name, f.level) for f in find_faults(draft_with(devices=devices))}
-    assert found == {("zone", "A", "remark"), ("device", "VAV_A", "remark"), ("device", "X", "remark")}
+    told = {("zone", "A", "remark"), ("device", "VAV_A", "remark"), ("device", "X", "remark")}
+    assert found == told | {("case", "two rooms", "remark")}
 
 
 def test_two_floors_must_differ(draft_with: Make) -> None:

@@ -66,7 +66,7 @@ def test_the_page_is_there_with_its_token_only(browser: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    "host", ["evil.example", "evil.example:8000", "127.0.0.1.evil.example", "192.168.1.2:8000", ""]
+    "host", ["evil.example", "evil.com@127.0.0.1", "evil.com@127.0.0.1:8000", "evil.example:8000", "127.0.0.1.evil.example", "192.168.1.2:8000", ""]
 )
 def test_another_host_is_refused(browser: Any, host: str) -> None:
     answer = browser.get(browser.at("api/state"), headers={"host": host})
@@ -74,7 +74,10 @@ def test_another_host_is_refused(browser: Any, host: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "headers", [{"origin": "http://evil.example"}, {"origin": "null"}, {"origin": "http://127.0.0.1:9999"}, {"sec-fetch-site": "cross-site"}]
+    "headers", [
+        {"origin": "http://evil.example"}, {"origin": "null"}, {"origin": "http://127.0.0.1:9999"},
+        {"origin": "http://evil.com@127.0.0.1"}, {"origin": "http://evil.com@127.0.0.1:8000"}, {"sec-fetch-site": "cross-site"},
+    ]
 )  # fmt: skip
 def test_another_page_is_refused(browser: Any, headers: dict[str, str]) -> None:
     answer = browser.post(browser.at("api/session"), json={"window": "evil"}, headers=headers)
@@ -222,6 +225,17 @@ def test_an_oversized_upload_is_stopped_on_its_way(
 def test_a_list_that_is_none_is_refused_by_name(browser: Any, name: str, body: bytes) -> None:
     answer = browser.post(browser.at("api/devices", name=name), content=body)
     assert answer.status_code == 400 and answer.json()["error"] in ("PlanError", "PlanError")
+
+
+@pytest.mark.parametrize("name", [".", "%2e", "%2E%2e", "", "spam.png", "%00", "a" * 5000])
+def test_what_is_no_drawing_is_not_dropped(browser: Any, desk: LabelDesk, name: str) -> None:
+    kept = desk.store.own / "drawings" / "kept.png"
+    Image.new("L", (30, 30), 255).save(kept)
+    answer = browser.delete(browser.at(f"api/drawings/{name}"))
+    assert 400 <= answer.status_code < 500 and kept.is_file()
+    if answer.status_code == 400:
+        assert answer.json()["error"] == "PlanError" and "drawing: expected" in answer.json()["message"]
+    assert browser.delete(browser.at("api/drawings/kept.png")).status_code == 200 and not kept.exists()
 
 
 @pytest.mark.parametrize("name", ["..%2f..%2fbuilding.yaml", "%2e%2e", "spam.png", "..%5ca.png"])

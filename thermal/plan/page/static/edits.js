@@ -101,11 +101,20 @@ export function rename(from, to) {
   return true;
 }
 
+// An area of a zone's own; null gives the facade back to the ratio of its floor.
 export function glaze(zone, side, area) {
   const sides = { ...page.draft.glazing[zone], [side]: area };
-  if (!area) delete sides[side];
+  if (area === null) delete sides[side];
   const glazing = { ...page.draft.glazing, [zone]: sides };
   change(`glazing of ${zone}`, { glazing: Object.keys(sides).length ? glazing : without(glazing, new Set([zone])) });
+}
+
+// The glazed share of a facade, or of all (""), of a floor, or of the whole building (""); null takes it away.
+export function glazeBy(floor, side, ratio) {
+  const ratios = page.draft.glazing_ratio, sides = { ...ratios[floor], [side]: ratio };
+  if (ratio === null) delete sides[side];
+  const all = { ...ratios, [floor]: sides };
+  change("window-to-wall ratio", { glazing_ratio: Object.keys(sides).length ? all : without(all, new Set([floor])) });
 }
 
 const touch = (names, changes) => {
@@ -233,7 +242,9 @@ export function addFloor() {
 export function editFloor(changes) {
   const old = floorOf().name;
   const devices = changes.name ? page.draft.devices.map((d) => (d.floor === old ? { ...d, floor: changes.name } : d)) : page.draft.devices;
-  changeFloor("edit the floor", { ...floorOf(), ...changes }, { devices });
+  const { [old]: own, ...others } = page.draft.glazing_ratio;
+  const ratios = own ? { ...others, [changes.name || old]: own } : others;
+  changeFloor("edit the floor", { ...floorOf(), ...changes }, { devices, glazing_ratio: ratios });
 }
 
 export function moveFloor(by) {
@@ -250,7 +261,7 @@ export function dropFloor() {
   const rest = mapZones((zone) => (gone.has(zone) ? null : zone));
   const devices = rest.devices.map((d) => (d.floor === floorOf().name ? { ...d, ...placed } : d));
   const at = Math.max(0, page.floor - 1);
-  change("remove a floor", { floors, ...rest, devices });
+  change("remove a floor", { floors, ...rest, devices, glazing_ratio: without(page.draft.glazing_ratio, new Set([floorOf().name])) });
   page.floor = Math.min(at, Math.max(0, floors.length - 1));
 }
 

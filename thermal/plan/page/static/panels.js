@@ -179,8 +179,9 @@ function zonePanel(zone) {
     devices.length ? el("ul", { class: "plain" }, devices.map((d) => el("li", {}, el("button", { type: "button", class: "link", onclick: () => { select({ devices: [d.name] }); } }, d.name), ` ${d.type}`)))
       : el("p", { class: "soft" }, "No device serves this zone."),
     el("h3", {}, "Glazing"),
-    sides.length ? el("div", { class: "grid" }, sides.map((side) => field(`${side} [m²], of ${(facts?.facades?.[side] || 0).toFixed(1)}`, number(glass[side], (v) => edits.glaze(zone, side, v || 0), { min: "0", id: `glazing-${side}` }))))
+    sides.length ? el("div", { class: "grid" }, sides.map((side) => field(`${side} [m²], of ${(facts?.facades?.[side] || 0).toFixed(1)}`, number(glass[side], (v) => edits.glaze(zone, side, v), { min: "0", id: `glazing-${side}`, placeholder: `${facts?.glazing?.[side] || 0}` }))))
       : el("p", { class: "soft" }, "This zone has no facade."),
+    sides.length > 0 && el("p", { class: "soft" }, "Empty: as the window-to-wall ratio on the tab Building says. 0: no window."),
   ];
 }
 
@@ -211,6 +212,17 @@ function selectionPanel() {
   return [el("p", { class: "soft pad" }, "Select a zone or a device on the plan to see and change it here.")];
 }
 
+// Window-to-wall ratios of a floor, or of the whole building (""): of all facades, and of each that differs.
+function ratioFields(floor) {
+  const ratios = page.draft.glazing_ratio, own = ratios[floor] || {}, whole = (floor && ratios[""]) || {};
+  const percent = (share) => (share === undefined ? "" : `${Math.round(share * 1000) / 10}`);
+  return el("div", { class: "grid" }, ["", ...SIDES].map((side) => {
+    const taken = side ? own[""] ?? whole[side] ?? whole[""] : whole[""];
+    const attributes = { min: "0", max: "100", id: `ratio-${floor ? "floor" : "building"}-${side || "all"}`, placeholder: percent(taken) || "0" };
+    return field(`${side || "all facades"} [%]`, number(percent(own[side]), (v) => edits.glazeBy(floor, side, v === null ? null : v / 100), attributes));
+  }));
+}
+
 const site = (key, value) => change(`edit ${key}`, { site: { ...page.draft.site, [key]: value } });
 
 function buildingPanel() {
@@ -226,11 +238,15 @@ function buildingPanel() {
     field("Time zone, IANA name", text(place.timezone, (v) => site("timezone", v.trim()), { id: "site-timezone", list: "timezones", placeholder: "Europe/Berlin" }), messageOf("site", "timezone")), zones,
     !place.timezone && el("button", { type: "button", class: "link", disabled: off, onclick: () => site("timezone", Intl.DateTimeFormat().resolvedOptions().timeZone) }, "Take this computer's"),
     el("p", { class: "soft" }, `Cells of ${size} m. ${page.telemetry ? `Telemetry: ${page.telemetry}.` : "No telemetry yet: put it into the case folder when the page is done."}`),
+    el("h3", {}, "Windows: share of the facade that is glass"),
+    el("p", { class: "soft" }, "For the whole building. Floors below and single zones (tab Selection) may differ; an empty field takes what stands in grey."),
+    ratioFields(""), ...[...errorsOf("case", "")].map((f) => el("p", { class: "message" }, f.message)),
     floor && [
       el("h2", {}, `Floor ${floor.name}`),
       el("div", { class: "grid" },
         field("Name", text(floor.name, (v) => edits.editFloor({ name: v.trim() }), { id: "floor-name" }), messageOf("floor", floor.name)),
         field("Clear height [m]", number(floor.height, (v) => v > 0 && edits.editFloor({ height: v }), { id: "floor-height", min: "0.1" }))),
+      el("h3", {}, "Windows of this floor"), ratioFields(floor.name), ...errorsOf("case", floor.name).map((f) => el("p", { class: "message" }, f.message)),
       el("div", { class: "row" },
         el("button", { type: "button", disabled: off || page.floor === 0, onclick: () => edits.moveFloor(-1) }, "Lower"),
         el("button", { type: "button", disabled: off || page.floor === page.draft.floors.length - 1, onclick: () => edits.moveFloor(1) }, "Higher"),
@@ -250,7 +266,7 @@ export function showFinding(finding) {
     const at = page.draft.floors.findIndex((floor) => floor.name === finding.name);
     if (at >= 0) { page.floor = at; tell("all"); }
     showTab("building");
-  }
+  } else showTab("building"); // of the case as a whole, such as its windows
 }
 
 function problemsPanel() {

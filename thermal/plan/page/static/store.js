@@ -32,7 +32,7 @@ export const floorOf = () => page.draft?.floors[page.floor] || null;
 export const workSeconds = () => page.draft.seconds + seconds;
 
 function decode(draft) {
-  return { ...draft, floors: draft.floors.map(decodeFloor) };
+  return { ...draft, glazing_ratio: draft.glazing_ratio || {}, floors: draft.floors.map(decodeFloor) }; // kept by a browser, it may be older
 }
 
 function encode(draft) {
