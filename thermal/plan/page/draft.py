@@ -8,7 +8,17 @@ from numpy.typing import NDArray
 from pydantic import Field, ValidationError
 
 from thermal.case.building import PLAN_TOKENS as BASIC
-from thermal.case.building import Airflow, Building, Device, Entry, FloorPlan, FloorPlans, GeometryQuality, Location
+from thermal.case.building import (
+    Airflow,
+    Building,
+    Device,
+    Emitting,
+    Entry,
+    FloorPlan,
+    FloorPlans,
+    GeometryQuality,
+    Location,
+)
 from thermal.case.plan import facade_areas
 from thermal.errors import LabelError
 from thermal.plan.drawing import Finite
@@ -89,6 +99,8 @@ class DraftDevice(Entry):
         The zone it serves.
     fed_by
         Devices that feed it.
+    emitter
+        What it gives its heat by, as in a case; the page keeps it.
     room
         What the list of devices says of its place, where no zone has that name.
     floor, x, y
@@ -99,6 +111,7 @@ class DraftDevice(Entry):
     type: Name
     zone: Name | None = None
     fed_by: tuple[Name, ...] = ()
+    emitter: Emitting | None = None
     room: Name = ""
     floor: Name | None = None
     x: Finite | None = None
@@ -316,7 +329,7 @@ def building_of_draft(draft: Draft) -> Building:
     return Building(
         location=Location.model_validate(draft.site.model_dump()),
         geometry=FloorPlans(draft.cell_size, floors, glazed_areas(draft)),
-        devices=tuple(Device(name=d.name, type=d.type, zone=d.zone, fed_by=d.fed_by) for d in draft.devices),
+        devices=tuple(Device(**d.model_dump(include=set(Device.model_fields))) for d in draft.devices),
         **{key: getattr(draft, key) for key in _SHARED},
     )
 

@@ -106,7 +106,8 @@ def test_every_file_of_the_page_is_its_own(browser: Any) -> None:
 
 def test_a_draft_is_saved_and_its_case_written(browser: Any, desk: LabelDesk, draft_with: Make) -> None:
     assert browser.get(browser.at("api/state")).json()["draft"]["name"] == "case"
-    answer = browser.put(browser.at("api/draft"), json=content(draft_with())).json()
+    glazed = draft_with(glazing={"A": {"west": 2.0}})
+    answer = browser.put(browser.at("api/draft"), json=content(glazed)).json()
     assert (answer["revision"], answer["written"], answer["findings"]) == (1, True, [])
     assert answer["zones"]["A"]["area"] == pytest.approx(3.0)
     assert (desk.store.folder / "building.yaml").is_file()
