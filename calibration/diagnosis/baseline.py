@@ -30,7 +30,7 @@ def fit_baseline(
     """
     known = {name: tuple(zones) for name, zones in effects.items()}
     found = models.fit(known, [{}])
-    emitter = emitter_of(Known(found.weighed, found.model, found.point), models, progress)
+    emitter = emitter_of(Known(found.weighed, found.model, found.point), models, known, progress)
     if emitter == "air":
         return models, found
     structure = replace(models.settings.structure, emitter=emitter)

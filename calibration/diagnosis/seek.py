@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 from calibration.diagnosis.baseline import fit_baseline
@@ -167,15 +167,16 @@ def seek(
     check_calibratable(case)
     faults = mend(case, tune, hold_out, {"dx": dx, "horizon": horizon}, progress)
     case = faults[-1].mended if faults else case
-    models = ModelComparison(case, ModelSettings(dx=dx), tune, hold_out, horizon)
+    drawn = models = ModelComparison(case, ModelSettings(dx=dx), tune, hold_out, horizon)
     untestable = models.untestable()
     untestable |= reasons_of(known, ruled_out, untestable)
     effects: dict[str, tuple[str, ...]] = {name: () for name in known}
-    models, baseline = fit_baseline(models, effects, progress)
+    models, baseline = fit_baseline(drawn, effects, progress)
     first = errors = held_out(models, baseline)
     turns = elsewhere(baseline, first) and models.alternate(baseline.built.inputs)
     if turns:
-        baseline = models.fit(effects, [{}], baseline.built)
+        # what heaters give their heat by is chosen by days that tune, and these are others now
+        models, baseline = fit_baseline(replace(drawn, tune=models.tuned, hold_out=models.judged), effects, progress)
         errors = held_out(models, baseline)
     testable = [e for e in CATALOGUE if e not in untestable]
     rounds = search(models, baseline, errors, testable, progress)

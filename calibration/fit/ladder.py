@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -83,7 +83,9 @@ def climb(drawn: FittedCase, began: float, progress: Progress | None = None) -> 
     return replace(kept.result(began, progress), rungs=rungs, uncalibrated=drawn.uncalibrated(progress))
 
 
-def emitter_of(fitted: Fitted, given: Tuned, progress: Progress | None = None) -> Unknown:
+def emitter_of(
+    fitted: Fitted, given: Tuned, known: Mapping[str, Sequence[str]], progress: Progress | None = None
+) -> Unknown:
     """Find what a building as drawn is best taken to give its heat by, where the case does not say it.
 
     Parameters
@@ -92,10 +94,12 @@ def emitter_of(fitted: Fitted, given: Tuned, progress: Progress | None = None) -
         As drawn, with all of that heat in the air.
     given : Tuned
         The case and its days.
+    known : mapping of str to sequence of str
+        Effects that the fitted model has, with their zones: so have all that it is weighed against.
     progress : callable, optional
         Called with stage, done, total.
     """
-    ladder = _Ladder(given, progress, replace(given.calibration, starts=1))
+    ladder = _Ladder(given, progress, replace(given.calibration, starts=1, effects=known))
     if is_large(given.case.building.zone_names) or not ladder.guesses:
         return "air"
     looked = [ladder.look("drawn", fitted)]
@@ -106,7 +110,7 @@ def emitter_of(fitted: Fitted, given: Tuned, progress: Progress | None = None) -
     # a drawing that is wrong altogether is better with anything slow
     source = telemetry_inputs(given.case)
     lumped = ladder.solve(replace(ladder.base, structure=Structure(lumped=True, sun=source.measured(IRRADIANCE))))
-    wrong = ladder.look("lumped", lumped.best).left.mae < best.left.mae
+    wrong = ladder.look("lumped", lumped.best).left.mae < (1.0 - ADVANCE) * best.left.mae
     return "air" if wrong else best.fit.settings.structure.emitter
 
 
@@ -198,7 +202,7 @@ def climb_from(
     kept = looked[best]
     if kept.fit is not None and kept.fit.settings.structure.lumped and not kept.fit.settings.effects:
         moved = replace(kept.fit.settings, effects={CLOCK: ()})
-        looked.append(ladder.tried("shifted", moved, kept.fit.best, _MOVED, kept.left.mae))
+        looked.append(ladder.tried("shifted", moved, kept.fit.best, _MOVED, kept.left.mae, anew=False))
         kept = kept if looked[-1].fit is None else looked[-1]
     rungs = tuple(Rung(each.name, each.left.mae, each.parameters, each is kept) for each in looked)
     return rungs, None if kept.fit is None else replace(kept.fit, left=kept.left), kept.left
@@ -251,16 +255,18 @@ class _Ladder:
         case = self.given.case
         return self.base.structure.emitter == "air" and bool(unknown_heaters(case.building, case.telemetry.frame))
 
-    def tried(self, name: str, settings: CalibrationSettings, known: Fitted, least: float, error: float) -> _Looked:
+    def tried(
+        self, name: str, settings: CalibrationSettings, known: Fitted, least: float, error: float, *, anew: bool = True
+    ) -> _Looked:
         """Look at a structure as it begins, and fit it where that promises to be better by a share.
 
         Where heat goes elsewhere what is known of other parameters is wrong, so such a fit begins anew: from the
         estimate with all heat in the air that of a house with heated floors ended at five times the error.
         """
         seen = self.look(name, _begun(self.given, settings, known))
-        if seen.left.mae >= (1.0 - least) * error:
+        if not seen.left.mae < (1.0 - least) * error:  # nor where days are too few to leave any out
             return seen
-        found = self.solve(settings, known if settings.effects else None)
+        found = self.solve(settings, None if anew else known)
         return self.look(name, found.best, found)
 
     def emitters(self, fitted: Fitted, error: float) -> list[_Looked]:
@@ -271,7 +277,7 @@ class _Ladder:
         seen = self.tried("floor", floor, fitted, _PROMISED, error)
         if seen.fit is None:
             return []
-        if seen.left.mae >= (1.0 - ADVANCE) * error:
+        if not seen.left.mae < (1.0 - ADVANCE) * error:
             return [seen]
         simpler = self.solve(radiator)
         return [self.look("radiator", simpler.best, simpler), seen]

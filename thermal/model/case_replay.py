@@ -185,6 +185,8 @@ def replay_inputs(case: Case, network: ThermalNetwork, provider: InputProvider |
 def _held(case: Case) -> pd.DataFrame:
     """Temperatures that zones are held at in a spin-up: measured, the last ones for a day, then the estimated ones."""
     measured, day = case.zone_temperatures(), max(1, round(DELAY / case.telemetry.step))
+    if measured.shape[1] == 1:  # no other zone tells anything of it
+        return measured.ffill().bfill()
     known = measured.notna().any()  # a zone that is never measured is not held
     late = case.zone_temperatures_estimated().where(known & (measured.ffill().notna()))
     return measured.ffill(limit=day).fillna(late).bfill()
