@@ -164,7 +164,7 @@ def _twins(label: Mapping[str, Any]) -> list[str]:
     return [twin.name for twin in twins_of(spec)]
 
 
-def report(out: Path, published: bool) -> str:
+def report(out: Path, published: bool, table: str = NAME) -> str:
     """Score what is answered, and write the tables.
 
     Parameters
@@ -173,6 +173,8 @@ def report(out: Path, published: bool) -> str:
         Folder of the trials.
     published : bool
         Also replace the table between its marks.
+    table : str
+        Whose marks; those of another than the usual one hold the rates alone.
     """
     trials = read_trials(out)
     if not trials:
@@ -207,7 +209,9 @@ def report(out: Path, published: bool) -> str:
     worlds = {t.world for t in trials}
     if published and worlds != {"office"}:
         raise SystemExit(f"{out}: expected offices, found trials of {', '.join(sorted(worlds))}; publish with `worlds`")
-    if published and len(_kinds(trials)) > 1:
+    if published and table != NAME:
+        publish(table, short)
+    elif published and len(_kinds(trials)) > 1:
         publish(NAME, short)
         publish(f"{NAME}_detail", detail)
     elif published:

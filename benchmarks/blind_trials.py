@@ -145,6 +145,7 @@ def main() -> int:
     command = commands.add_parser("score", help="open the seals of answered trials and score the answers")
     command.add_argument("--out", type=Path, required=True, help="folder of the trials")
     command.add_argument("--publish", action="store_true", help="replace the table between its marks")
+    command.add_argument("--table", default="blind_trials", help="whose marks, such as blind_trials_fresh")
     command.set_defaults(run=_score)
     command = commands.add_parser("worlds", help="score answered trials of several folders by world")
     command.add_argument("--out", type=Path, required=True, nargs="+", help="folders of the trials")
@@ -155,7 +156,7 @@ def main() -> int:
 
 
 def _score(options: argparse.Namespace) -> int:
-    print(report(options.out, options.publish))
+    print(report(options.out, options.publish, options.table))
     return 0
 
 
