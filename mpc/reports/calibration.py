@@ -164,13 +164,16 @@ def _parameter_sentence(parameters: Sequence[ParameterEstimate]) -> str:
     estimated = [p for p in parameters if p.standard_error is not None]
     told = sum(p.identifiable for p in estimated)
     absent = [p for p in estimated if p.at_bound and p.base == "solar_aperture" and p.value < p.start]
-    bound = [in_words(p.name) for p in estimated if p.at_bound and p not in absent]
-    free = len(estimated) - told - len(bound) - len(absent)
+    whole = [p for p in estimated if p.at_bound and p.base == "floor_heat_share"]
+    bound = [in_words(p.name) for p in estimated if p.at_bound and p not in (*absent, *whole)]
+    free = len(estimated) - told - len(bound) - len(absent) - len(whole)
     parts = [f"Of {counted(len(estimated), 'estimated parameter')} the data determine {told or 'none'}"]
     if free:
         parts.append(f"{free} stay{'s' if free == 1 else ''} open within the physical range")
     if absent:
         parts.append(f"{counted(len(absent), 'solar aperture')} of no size: no sun is seen to enter there")
+    if whole:
+        parts.append(f"{counted(len(whole), 'share')} of heat at an end: a floor gives all of it, or none")
     if not bound:
         return "; ".join([*parts, "none lies on a bound."])
     names = f" ({', '.join(bound)})" if len(bound) < 4 else ""
