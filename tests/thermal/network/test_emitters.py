@@ -213,6 +213,33 @@ def test_a_lumped_building_counts_its_heated_layers_once(
     assert kept[2] * 0.999 < found[2] < drawn[2] * 1.001
 
 
+def test_a_slab_is_heated_from_both_sides() -> None:
+    """Floor of a room and ceiling of that below in one slab: no layer is made up, with one emitter or with two."""
+    layers = (SCREED, CONCRETE, SCREED)
+    between = Surface(name="S", kind="floor", zone="room", other="hall", area=10.0, construction="between")
+    buildings = {}
+    for kinds in (("floor", None), (None, "ceiling"), ("floor", "ceiling")):
+        plain = house(None)
+        table = cast(ZoneTable, plain.geometry)
+        constructions = {**table.constructions, "between": layers}
+        table = ZoneTable(table.zones, (*table.surfaces[2:], between), constructions)
+        own = tuple(d.model_copy(update={"emitter": k}) for d, k in zip(plain.devices, kinds, strict=True))
+        buildings[kinds] = replace(plain, geometry=table, devices=own)
+    networks = {kinds: build_network(b) for kinds, b in buildings.items()}
+    assert len({n.n_node for n in networks.values()}) == 1
+    heated = networks["floor", "ceiling"].anatomy.heated
+    for key in (("floor", None), (None, "ceiling")):
+        ((side, (alone,)),) = networks[key].anatomy.heated.items()
+        (layer,) = heated[side]
+        assert layer.node.tolist() == alone.node.tolist() and layer.share == pytest.approx(alone.share)
+    slabs = [heat_at(n)[n.kind == "slab"].sum(axis=0) for n in networks.values()]
+    assert [s.tolist() for s in slabs] == [pytest.approx([1.0]), pytest.approx([1.0]), pytest.approx([1.0, 1.0])]
+    # lumped, the pipes in one place are two nodes
+    for building in buildings.values():
+        drawn, found = sums(building, Structure()), sums(building, Structure(lumped=True))
+        assert found[0] == pytest.approx(drawn[0], rel=0.03) and found[1] == pytest.approx(drawn[1], rel=0.03)
+
+
 def test_effects_of_a_meter_follow_the_heat() -> None:
     network = build_network(house("floor"), effects=chosen({"flow_gain": (), "clock_shift": ()}))
     theta = network.values({"flow_gain@room": 0.1, "heat_clock_shift": 0.5})
