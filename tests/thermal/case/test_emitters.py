@@ -66,7 +66,7 @@ def test_a_device_that_is_not_read_gives_what_it_was_seen_to_give() -> None:
     hour = np.arange(96.0)
     for other in (50.0, 9000.0):
         frame[names[0]], frame[names[1]], frame[names[2]] = 100.0 + hour % 3, 1600.0 + hour % 5, other + hour % 7
-        frame.iloc[lost, frame.columns.get_loc(names[0])] = np.nan
+        frame.loc[frame.index[lost], names[0]] = np.nan
         found = replace(case, telemetry=Telemetry.from_frame(frame))
         power, heat = found.heating_power_estimated(), found.zone_heat_estimated()["A"]
         gap = power[0].iloc[lost]
