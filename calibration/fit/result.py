@@ -89,8 +89,9 @@ class Rung(Plain):
     name : {"drawn", "named", "radiator", "floor", "wind", "zoned", "lumped", "recurring", "lumped floor", "shifted"}
         As drawn; with what a diagnosis named; with heat that radiates or that floors give, where the case does not say
         what gives it; with films that follow the wind; with slabs and furniture by zone; lumped; lumped with a gain
-        that recurs from day to day, with floors that are heated, or with heat and weather moved in time. What stands
-        after ``radiator`` or ``floor`` has these too where they were better by a tenth.
+        that recurs from day to day, with floors that are heated, or with heat and weather moved in time. ``wind`` and
+        ``zoned`` have the heat of ``radiator`` or ``floor`` too where that was kept. ``lumped`` has it in the air, but
+        for what settings or case say; ``recurring`` and ``shifted`` have what the lumped one has that they stand on.
     left_out_mae : float
         Mean absolute error on tuning days that a fit has not seen [K]; NaN where there are too few days.
     parameters : int

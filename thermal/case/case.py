@@ -266,7 +266,8 @@ class Case:
         temperatures, found = self._estimated_temperatures
         parts = heat_parts(self.building, self.usable, temperatures)
         filled, lacking = estimate_parts(self.building, self.usable, parts, self.step)
-        stages = [total_heat(self.building, stage) for stage in (parts, filled)]
+        devices, power = power_by_device(self.building, self.usable, filled[1])
+        stages = [total_heat(self.building, stage) for stage in (parts, (filled[0], power))]
         gained = [heat.notna() & self._zone_heat.isna() for heat in stages]
         kept = [
             i
@@ -274,7 +275,7 @@ class Case:
             for i in own
             if g.loc[i.start : i.end, i.zone].any()
         ]
-        return stages[-1], tuple(kept), power_by_device(self.building, self.usable, filled[1])
+        return stages[-1], tuple(kept), devices
 
     def boundary_temperatures(self) -> pd.DataFrame:
         """Temperatures that the zones look out on.

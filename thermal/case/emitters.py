@@ -4,6 +4,7 @@ from collections.abc import Container
 from dataclasses import dataclass
 from typing import Literal, cast
 
+import numpy as np
 import pandas as pd
 
 from thermal.case.building import Building, Device
@@ -96,8 +97,13 @@ def emitters_of(building: Building, unknown: Unknown = "air") -> tuple[Emitter, 
     return tuple(made)
 
 
-def power_by_device(building: Building, frame: pd.DataFrame, power: pd.DataFrame) -> pd.DataFrame:
+def power_by_device(
+    building: Building, frame: pd.DataFrame, power: pd.DataFrame
+) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Heat that each device reports as power; where it fails to, its share of what its zone is estimated to get.
+
+    A share is within what the device was ever read to give (at least 0 W where it was never read), since a zone may be
+    estimated to get less than its other devices tell, or more than they all can give.
 
     Parameters
     ----------
@@ -110,15 +116,20 @@ def power_by_device(building: Building, frame: pd.DataFrame, power: pd.DataFrame
 
     Returns
     -------
-    DataFrame
+    tuple of DataFrame
         Shape (n_time, n_device) [W], columns 0..n-1 in the order of `building.devices`; 0 for a device without power.
+        And what the zones get by power with these, shape of `power` [W].
     """
     watts = {n: frame.get(f"{device.name}/{HEATING_POWER}") for n, device in enumerate(building.devices)}
     found = pd.DataFrame(0.0, index=frame.index, columns=range(len(building.devices)))
+    whole = power.copy()
     for zone in power:
         own = [n for n, device in enumerate(building.devices) if device.zone == zone and watts[n] is not None]
         told = pd.DataFrame({n: watts[n] for n in own}, dtype=float)
         rest = (power[zone] - told.sum(axis=1)) / told.isna().sum(axis=1).clip(lower=1)
         for n in own:
-            found[n] = told[n].fillna(rest)
-    return found
+            low, high = (0.0, np.inf) if told[n].isna().all() else (told[n].min(), told[n].max())
+            found[n] = told[n].fillna(rest.clip(low, high))
+        estimated = told.isna().any(axis=1) & power[zone].notna()
+        whole[zone] = power[zone].where(~estimated, found[own].sum(axis=1))
+    return found, whole

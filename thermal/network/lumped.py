@@ -39,6 +39,12 @@ _KNOWN = 0.1
 #: Share of a heated layer's conductance that counts as none [-].
 _NEGLIGIBLE = 1e-3
 
+#: Share of the drawing's coupling and capacity that a zone's mass keeps at least where heated layers have the rest [-].
+_LEFT = 0.01
+
+#: Resistance that keeps pipes in one place apart, as a share of that between pipes and air [-].
+_APART = 0.01
+
 #: Directions that the sun is taken from [deg]: azimuth and tilt of the compass's points and of a roof.
 _PLANES = {**{name: (90.0 * number, VERTICAL) for number, name in enumerate(FACADES)}, "roof": (0.0, UPWARD)}
 
@@ -47,6 +53,24 @@ _PERIODS = (24.0, 12.0, 8.0)
 
 #: Solar transmittance of a pane that nothing tells [-]: double glazing (EN 410).
 _TRANSMITTANCE = 0.6
+
+
+@dataclass(frozen=True)
+class _Layer:
+    """What the pipes of a heated layer are joined to in a steady state.
+
+    Parameters
+    ----------
+    to_air, outward, to_layers : ndarray, shape (n_zone,), (n_boundary,) and (n_layer,)
+        Conductances to the air of the zones, to the boundaries and to the pipes of the other layers [W/K].
+    capacity : float
+        Heat capacity that follows the pipes [J/K].
+    """
+
+    to_air: FloatArray
+    outward: FloatArray
+    to_layers: FloatArray
+    capacity: float
 
 
 @dataclass(frozen=True)
@@ -64,8 +88,7 @@ class _Drawn:
     air, mass : ndarray, shape (n_zone,)
         Heat capacities of the air and of the rest, as far as it follows the zone's temperature [J/K].
     heated : dict
-        Of each layer that emitters warm: conductances from its pipes to the air of the zones (n_zone,) and to the
-        boundaries (n_boundary,) [W/K], and the heat capacity that follows it [J/K].
+        Each layer that emitters warm, by zone and side. What it conducts and stores is in no other of these.
     """
 
     direct: FloatArray
@@ -74,7 +97,7 @@ class _Drawn:
     inner: FloatArray
     air: FloatArray
     mass: FloatArray
-    heated: dict[tuple[str, str], tuple[FloatArray, FloatArray, float]]
+    heated: dict[tuple[str, str], _Layer]
 
 
 def lump(network: ThermalNetwork, quality: GeometryQuality, structure: Structure) -> tuple[GraphBuilder, IntArray]:
@@ -138,20 +161,24 @@ def _add_heated(
 ) -> None:
     """Add the layers of a zone that emitters warm: a node each, whose heat goes where the drawing lets it."""
     zone = graph.zones[number]
-    for (name, side), (to_air, outward, capacity) in drawn.heated.items():
+    heated = graph.anatomy.heated
+    for (name, side), layer in drawn.heated.items():
         if name != zone:
             continue
         node = graph.volumes("screed", number)
         heat = multiplier("screed_heat_capacity_multiplier", zone)
         scale = multiplier("screed_conductivity_multiplier", zone)
-        graph.capacity(f"screed {zone} {side}", heat, node, capacity)
-        least = _NEGLIGIBLE * (to_air.sum() + outward.sum())
-        there, beyond = np.flatnonzero(to_air > least), np.flatnonzero(outward > least)
-        graph.face(f"screed-air {zone} {side}", scale, node, air[there], to_air[there])
-        codes = np.array([graph.boundary(graph.boundaries[j]) for j in beyond], dtype=np.int64)
-        if codes.size:
-            graph.face(f"screed-boundary {zone} {side}", scale, node, codes, outward[beyond])
-        graph.anatomy.heated[zone, side] = [Heated(node, np.ones(1), graph.anatomy.rooms[zone].floor_area)]
+        graph.capacity(f"screed {zone} {side}", heat, node, layer.capacity)
+        codes = [graph.boundary(name) for name in graph.boundaries]
+        laid = {k: heated[key][0].node[0] for k, key in enumerate(drawn.heated) if key in heated}
+        pipes, beside = list(laid.values()), layer.to_layers[list(laid)]
+        heated[zone, side] = [Heated(node, np.ones(1), graph.anatomy.rooms[zone].floor_area)]
+        ends = {"air": (air, layer.to_air), "boundary": (codes, layer.outward), "screed": (pipes, beside)}
+        least = _NEGLIGIBLE * (layer.to_air.sum() + layer.outward.sum())
+        for kind, (far, conductance) in ends.items():
+            there = np.flatnonzero(conductance > least)
+            if there.size:
+                graph.face(f"screed-{kind} {zone} {side}", scale, node, np.asarray(far)[there], conductance[there])
 
 
 def _add_gains(
@@ -201,30 +228,57 @@ def _drawn(network: ThermalNetwork) -> _Drawn:
     beside = (member @ joined[:n, :n] @ member.T).toarray()
     inner = laplacian[rest][:, rest] + 1e-9 * sp.eye(rest.size)
     outer = joined[:n][rest][:, n:].toarray()
-    solve = sla.splu(inner.tocsc()).solve
-    follows = solve(np.hstack([to_rest.T, outer]))
+    given = _given(network, rest)
+    solved = sla.splu(inner.tocsc()).solve(np.hstack([to_rest.T, outer, given]))
+    follows, warmed = np.split(solved, [count + outer.shape[1]], axis=1)
+    # eliminate all but the pipes: what passes them is a path of their own, and not the zones' as well
+    gain = np.linalg.inv(given.T @ warmed + np.diag(_before(network, joined, given.T @ warmed)))
+    seen = given.T @ follows
+    star, stored = gain @ seen, capacity[rest] @ warmed @ gain
     steady = to_rest @ follows
-    pairs = beside + steady[:, :count]
+    steady = np.maximum(steady - seen[:, :count].T @ star, 0.0)
+    pairs, through = beside + steady[:, :count], steady[:, count:]
     np.fill_diagonal(pairs, 0.0)
-    shares, coupled, through = follows[:, :count], to_rest.sum(axis=1), steady[:, count:]
+    coupled, mass = to_rest.sum(axis=1), follows[:, :count].T @ capacity[rest]
+    coupled = np.maximum(coupled - star[:, :count].sum(axis=0), _LEFT * coupled)
+    mass = np.maximum(mass - stored @ seen[:, :count], _LEFT * mass)
     # behind the coupling of air and mass, so that both in series are the drawing's
     behind = coupled / np.maximum(coupled - through.sum(axis=1), 0.1 * coupled)
-    heated, place = {}, np.full(n, -1)
-    place[rest] = np.arange(rest.size)
-    for key, layers in network.anatomy.heated.items():
-        given = np.zeros(rest.size)
-        area = sum(layer.area for layer in layers)
-        for layer in layers:
-            np.add.at(given, place[layer.node], layer.share * layer.area / area)
-        warmed = solve(given)
-        pipes = float(given @ warmed)
-        heated[key] = (to_rest @ warmed / pipes, outer.T @ warmed / pipes, float(capacity[rest] @ warmed) / pipes)
     return _Drawn(
         direct=direct,
         slow=through * behind[:, None],
         pairs=pairs,
         inner=coupled,
         air=member @ capacity,
-        mass=shares.T @ capacity[rest],
-        heated=heated,
+        mass=mass,
+        heated={
+            key: _Layer(star[k, :count], star[k, count:], -gain[k], float(stored[k]))
+            for k, key in enumerate(network.anatomy.heated)
+        },
     )
+
+
+def _given(network: ThermalNetwork, rest: IntArray) -> FloatArray:
+    """Share of each heated layer's heat that each node gets, shape (n_rest, n_layer) [-]."""
+    given = np.zeros((network.n_node, len(network.anatomy.heated)))
+    for k, layers in enumerate(network.anatomy.heated.values()):
+        area = sum(layer.area for layer in layers)
+        for layer in layers:
+            np.add.at(given[:, k], layer.node, layer.share * layer.area / area)
+    return given[rest]
+
+
+def _before(network: ThermalNetwork, joined: sp.csr_matrix, pipes: FloatArray) -> FloatArray:
+    """Resistance from each layer's pipes to the nodes that share their heat, shape (n_layer,) [K/W].
+
+    Pipes between two nodes have the resistances to both, in parallel. Beside it a hundredth of their own resistance,
+    so that pipes of two layers in one place are two nodes; no steady flow of heat depends on it.
+    """
+    before = _APART * np.diag(pipes)
+    for k, layers in enumerate(network.anatomy.heated.values()):
+        area = sum(layer.area for layer in layers)
+        for layer in layers:
+            if layer.node.size > 1:
+                before[k] += (layer.area / area) ** 2 * layer.share.prod() / joined[layer.node[0], layer.node[1]]
+    return before
+

@@ -216,7 +216,10 @@ class _Part:
 def _parts(
     graph: GraphBuilder, surface: Surface, layers: tuple[Layer, ...], wall: Chain, nodes: IntArray
 ) -> tuple[_Part, _Part, NDArray[np.bool_]]:
-    """Give the parts of a chain, that between a room and the pipes in it second, and which nodes belong to that."""
+    """Give the parts of a chain, that between a room and the pipes in it second, and which nodes belong to that.
+
+    Where both sides are heated, the layers before the pipes of the surface's own zone are the second part.
+    """
     group, facade = _group(surface), _facade(graph, surface)
     names = f"{group}_conductivity_multiplier", f"{group}_heat_capacity_multiplier"
     plain = _Part(None, group, *names, *(graph.parameter(name, facade=facade) for name in names))
@@ -227,14 +230,17 @@ def _parts(
         back = "floor" if surface.kind == "ceiling" else "ceiling"
         behind = (wall.near + wall.far + float(np.sum(wall.between)) - place)[::-1]
         seen.append((surface.other, back, layers[::-1], nodes[::-1], behind))
+    warm, before = plain, np.zeros(nodes.size, dtype=bool)
     for zone, side, own, chain, at in seen:
-        if (zone, side) in graph.anatomy.heated:
-            pipes = pipes_at(own)
-            graph.anatomy.heated[zone, side].append(Heated(*shared_at(pipes, chain, at), surface.area))
+        if (zone, side) not in graph.anatomy.heated:
+            continue
+        pipes = pipes_at(own)
+        graph.anatomy.heated[zone, side].append(Heated(*shared_at(pipes, chain, at), surface.area))
+        if warm is plain:
             names = "screed_conductivity_multiplier", "screed_heat_capacity_multiplier"
             warm = _Part(zone, "screed", *names, *(layer_parameter(graph, name, zone) for name in names))
-            return plain, warm, np.isin(nodes, chain[at <= pipes * (1.0 + 1e-9)])
-    return plain, plain, np.zeros(nodes.size, dtype=bool)
+            before = np.isin(nodes, chain[at <= pipes * (1.0 + 1e-9)])
+    return plain, warm, before
 
 
 def _add_layers(graph: GraphBuilder, zones: Mapping[str, Zone], surface: Surface, layers: tuple[Layer, ...]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -55,6 +56,23 @@ def test_powers_of_the_devices_are_those_of_their_zone() -> None:
     inputs = telemetry_inputs(case)
     assert inputs.values("emitted", "W").shape == (96, 4) and np.isfinite(inputs.emitted).all()
     assert inputs.emitted_rate[10] == pytest.approx([1.0, 2.0, 3.0, 0.0])
+
+
+def test_a_device_that_is_not_read_gives_what_it_was_seen_to_give() -> None:
+    """A small heater beside a large one, in a building whose other zone is warmed little, then much."""
+    case = heated()
+    frame, lost = case.telemetry.frame.copy(), slice(40, 70)
+    names = [f"H{n}/{HEATING_POWER}" for n in (1, 2, 3)]
+    hour = np.arange(96.0)
+    for other in (50.0, 9000.0):
+        frame[names[0]], frame[names[1]], frame[names[2]] = 100.0 + hour % 3, 1600.0 + hour % 5, other + hour % 7
+        frame.loc[frame.index[lost], names[0]] = np.nan
+        found = replace(case, telemetry=Telemetry.from_frame(frame))
+        power, heat = found.heating_power_estimated(), found.zone_heat_estimated()["A"]
+        gap = power[0].iloc[lost]
+        assert gap.notna().all() and gap.between(100.0, 102.0).all()
+        assert np.abs(power[[0, 1]].sum(axis=1) - heat)[heat.notna()].max() < 1e-9 and heat.notna().all()
+        assert (heat >= frame[names[1]]).all()
 
 
 def test_the_file_says_it_and_keeps_it(plan_draft: Any, tmp_path: Path) -> None:

@@ -157,10 +157,11 @@ def test_layers_that_no_drawing_has_are_laid() -> None:
 
 def test_a_lumped_layer_gives_its_heat_where_the_drawing_does() -> None:
     drawn, lumped = (build_network(house("floor"), structure=Structure(lumped=k)) for k in (False, True))
-    (screed,) = np.flatnonzero((lumped.kind == "screed") & (lumped.zone == 0))
+    screed, beside = (np.flatnonzero((lumped.kind == "screed") & (lumped.zone == zone))[0] for zone in (0, 1))
     m = SymbolicModel(lumped).matrices(lumped.start())
-    row = -sp.csr_matrix(m.flow).toarray()[screed, : m.n + len(lumped.boundaries)]
-    row[screed] = 0.0
+    whole = -sp.csr_matrix(m.flow).toarray()[:, : m.n + len(lumped.boundaries)]
+    row = whole[screed] - whole[screed, beside] / whole[beside, beside] * whole[beside]  # the hall's gets no heat
+    row[[screed, beside]] = 0.0
     detailed = SymbolicModel(drawn).matrices(drawn.start())
     flow = sp.csr_matrix(detailed.flow).toarray()
     air = np.isin(np.arange(detailed.n), np.flatnonzero(drawn.kind == "air"))
@@ -171,6 +172,72 @@ def test_a_lumped_layer_gives_its_heat_where_the_drawing_does() -> None:
     at = lumped.boundaries.index("cellar") + m.n
     assert row[: m.n][np.flatnonzero(lumped.kind == "air")] / row.sum() == pytest.approx(airs, abs=2e-3)
     assert row[at] / row.sum() == pytest.approx(cellar, rel=2e-3) and 0.01 < cellar < 0.2
+
+
+def sums(building: Building, structure: Structure) -> tuple[FloatArray, FloatArray, float]:
+    """Rise of the zones by 1000 and 500 W in the air, and where the emitters give it, with boundaries at 0 [K], and C."""
+    network = build_network(building, structure=structure)
+    theta = network.start()
+    for i, parameter in enumerate(network.parameters):
+        theta[i] = 1.0 if parameter.base == "air_capacity_multiplier" else theta[i]
+    m = SymbolicModel(network).matrices(theta)
+    flow = sp.csr_matrix(m.flow).toarray()[:, : m.n]
+    given, emitted = network.heating.toarray() @ np.array([1000.0, 500.0]), network.emitted @ np.array([1000.0, 500.0])
+    driven = -sp.csr_matrix(m.flow).toarray()[:, m.n + len(network.boundaries) :]
+    emitted = given + driven @ emitted
+    rises = (sp.csr_matrix(network.observation).toarray() @ np.linalg.solve(flow, q) for q in (given, emitted))
+    return *rises, float(sp.csr_matrix(m.capacity).sum())
+
+
+def both(kinds: tuple[str, str], floor: tuple[Layer, ...]) -> Building:
+    """The house with two emitters in the room, those of the hall first."""
+    plain = house("floor", floor=floor)
+    mine = [Device(name=f"E{n}", type="other", zone="room", emitter=cast(Any, kind)) for n, kind in enumerate(kinds)]
+    return replace(plain, devices=(plain.devices[1], *mine))
+
+
+@pytest.mark.parametrize("emitter", ["floor", "ceiling", "both"])
+@pytest.mark.parametrize("floor", [(SCREED, FOAM, CONCRETE), (SCREED, CONCRETE), (SCREED,)])
+@pytest.mark.parametrize("structure", [Structure(), Structure(wall_nodes=2), BARE])
+def test_a_lumped_building_counts_its_heated_layers_once(
+    emitter: str, floor: tuple[Layer, ...], structure: Structure
+) -> None:
+    building = both(("floor", "ceiling"), floor) if emitter == "both" else house(emitter, floor=floor)
+    lumped = replace(structure, lumped=True)
+    drawn, found = sums(building, structure), sums(building, lumped)
+    plain, kept = sums(house(None, floor=floor), structure), sums(house(None, floor=floor), lumped)
+    # what lumping itself changes without emitters: the least conductances, and what follows the boundaries
+    slack = np.abs(1.0 - kept[0] / plain[0]) + 0.005
+    assert (np.abs(1.0 - found[0] / drawn[0]) < slack).all(), "heat of the air"
+    assert (np.abs(1.0 - found[1] / drawn[1]) < slack).all(), "heat of the layers"
+    assert kept[2] * 0.999 < found[2] < drawn[2] * 1.001
+
+
+def test_a_slab_is_heated_from_both_sides() -> None:
+    """Floor of a room and ceiling of that below in one slab: no layer is made up, with one emitter or with two."""
+    layers = (SCREED, CONCRETE, SCREED)
+    between = Surface(name="S", kind="floor", zone="room", other="hall", area=10.0, construction="between")
+    buildings = {}
+    for kinds in (("floor", None), (None, "ceiling"), ("floor", "ceiling")):
+        plain = house(None)
+        table = cast(ZoneTable, plain.geometry)
+        constructions = {**table.constructions, "between": layers}
+        table = ZoneTable(table.zones, (*table.surfaces[2:], between), constructions)
+        own = tuple(d.model_copy(update={"emitter": k}) for d, k in zip(plain.devices, kinds, strict=True))
+        buildings[kinds] = replace(plain, geometry=table, devices=own)
+    networks = {kinds: build_network(b) for kinds, b in buildings.items()}
+    assert len({n.n_node for n in networks.values()}) == 1
+    heated = networks["floor", "ceiling"].anatomy.heated
+    for key in (("floor", None), (None, "ceiling")):
+        ((side, (alone,)),) = networks[key].anatomy.heated.items()
+        (layer,) = heated[side]
+        assert layer.node.tolist() == alone.node.tolist() and layer.share == pytest.approx(alone.share)
+    slabs = [heat_at(n)[n.kind == "slab"].sum(axis=0) for n in networks.values()]
+    assert [s.tolist() for s in slabs] == [pytest.approx([1.0]), pytest.approx([1.0]), pytest.approx([1.0, 1.0])]
+    # lumped, the pipes in one place are two nodes
+    for building in buildings.values():
+        drawn, found = sums(building, Structure()), sums(building, Structure(lumped=True))
+        assert found[0] == pytest.approx(drawn[0], rel=0.03) and found[1] == pytest.approx(drawn[1], rel=0.03)
 
 
 def test_effects_of_a_meter_follow_the_heat() -> None:
