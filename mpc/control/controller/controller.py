@@ -316,7 +316,7 @@ class MpcController:
         """
         self._known, self.observer.memory = _Known(**saved["known"]), saved["estimate"]
         self._stuck.memory, self._far.count, self._starts.begun = saved["stuck"], saved["far"], saved["begun"]
-        self._possible.memory = dict(saved["possible"])
+        self._possible.memory = dict(saved.get("possible", {}))
         self._demand.peaks, self._demand.windows = dict(saved["peaks"]), list(saved["windows"])
         self.solver.memory = saved["solver"]
 

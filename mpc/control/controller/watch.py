@@ -33,7 +33,8 @@ class PossibleReadings:
     Notes
     -----
     Ranges and rates are those of the point types (`thermal.case.points.PointType`). A rate counts from the last reading
-    that was taken, over the time since; so a value that stays becomes possible again by itself.
+    that was taken, over the time since; so a value that stays becomes possible again by itself. A reading that was
+    taken later than now was taken by a wrong clock: it says nothing.
     """
 
     def __init__(self, columns: Sequence[str]) -> None:
@@ -69,6 +70,7 @@ class PossibleReadings:
         if not kind.possible(value):
             return f"{kind.told(value)} is outside of {kind.told(kind.lowest)} to {kind.told(kind.highest)}"
         last, when = self.memory.get(column, (value, now))
+        last, when = (value, now) if now < when else (last, when)
         elapsed = max((now - when).total_seconds(), _RATE_SECONDS)
         if abs(value - last) > kind.largest_rate * elapsed / 3600.0:
             before = f"{kind.told(last)} {elapsed / 60.0:.0f} min before"

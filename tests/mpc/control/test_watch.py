@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from mpc.control.controller.watch import FarFromModel, StuckSensors
+from mpc.control.controller.watch import FarFromModel, PossibleReadings, StuckSensors
 from mpc.errors import ControlError
 
 ZONES = ("hall", "lab", "loft")
@@ -67,3 +68,15 @@ def test_noise_that_does_not_show_is_not_watched() -> None:
     assert not StuckSensors(ZONES, np.full(3, 0.05), 0.0).watched.any()
     with pytest.raises(ControlError, match="probability"):
         StuckSensors(ZONES, np.full(3, 0.1), 1.0)
+
+
+def test_a_step_with_a_wrong_clock_does_not_last() -> None:
+    """What was read in the future, as a clock before it is set says, does not judge what comes after."""
+    column, stamp = "site/outside_air_temperature_sensor", pd.Timestamp("2026-01-10", tz="UTC")
+    watch, said = PossibleReadings([column]), list[str]()
+    watch.update({column: 263.15}, stamp.replace(year=2036), said)
+    summer = stamp + pd.Timedelta(days=150)
+    assert watch.update({column: 293.15}, summer, said) == {column: 293.15} and not said
+    assert watch.memory[column] == (293.15, summer)
+    assert np.isnan(watch.update({column: 250.0}, summer + pd.Timedelta(minutes=5), said)[column])
+    assert "faster than it can move" in said[0]
