@@ -110,12 +110,18 @@ def _mappings(file: PlantFile) -> dict[str, Any]:
     """Collect what all kinds of signals have in common."""
     inputs = file.actuators
     signals = [*file.measurements.values(), *inputs.values(), *(zone.temperature for zone in file.zones.values())]
+    units: dict[str, str] = {}
+    for signal in signals:
+        if signal.unit is not None:
+            unit = units.setdefault(signal.signal, signal.unit)
+            where, expected = f"signal {signal.signal!r}", f"one unit, {unit!r}"
+            PlantError.unless(unit == signal.unit, where, expected, repr(signal.unit))
     return {
         "measurements": {column: signal.signal for column, signal in file.measurements.items()},
         "actuators": {name: entry.signal for name, entry in inputs.items()},
         "zones": {name: zone.temperature.signal for name, zone in file.zones.items()},
         **file.energy.model_dump(),
-        "units": {signal.signal: signal.unit for signal in signals if signal.unit is not None},
+        "units": units,
         "limits": {name: entry.range for name, entry in inputs.items() if entry.range is not None},
         "kinds": {name: entry.kind for name, entry in inputs.items() if entry.kind is not None},
         "minimums": {name: entry.minimum for name, entry in inputs.items() if entry.minimum is not None},

@@ -14,7 +14,11 @@ _WITH_UNIT = re.compile(r"\s*([-+]?[0-9.]+(?:[eE][-+]?\d+)?)\s*([A-Za-z°]\S*)\s
 
 
 def _kelvin(value: Any) -> Any:
-    """Bring text such as ``21 degC`` into kelvin; leave all else."""
+    """Bring text such as ``21 degC`` into kelvin, in tables of hours too; leave all else."""
+    if isinstance(value, dict):
+        return {key: _kelvin(part) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [_kelvin(part) for part in value]
     found = _WITH_UNIT.fullmatch(value) if isinstance(value, str) else None
     if found is None:
         return value

@@ -3,7 +3,7 @@
 import json
 import zipfile
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from mpc.adapters.fmu.unit import Unit
 from mpc.errors import PlantError, ScenarioError
 from mpc.scenario.grid import StepGrid, index_seconds, means_of_steps, require_cover
 from thermal._types import FloatArray
+from thermal.case.years import within_years
 from thermal.errors import nearest
 
 
@@ -31,11 +32,14 @@ class NamedSeries:
         Since 1970 in UTC, rising [s].
     values : mapping of str to ndarray
         By name, shape (n_time,) [their own units].
+    units : mapping of str to str
+        By name, of those whose unit is declared.
     """
 
     where: str
     seconds: FloatArray
     values: Mapping[str, FloatArray]
+    units: Mapping[str, str] = field(default_factory=dict)
 
     def on(self, name: str, grid: StepGrid, *, lines: bool) -> FloatArray:
         """Average over the steps of a grid, shape (n_steps,) [unit of the series].
@@ -196,7 +200,23 @@ def run_ahead(
         rows.append(unit.get(listed))
     unit.end()
     columns = {name: np.array([row[name] for row in rows]) for name in listed}
-    return NamedSeries(f"outputs of {unit.name}", grid.edges[0] + step * np.arange(count + 1.0), columns)
+    declared = {name: unit.declared(unit.variables[name], "unit") for name in listed}
+    units = {name: told for name, told in declared.items() if told}
+    return NamedSeries(f"outputs of {unit.name}", grid.edges[0] + step * np.arange(count + 1.0), columns, units)
+
+
+def _stamps(texts: pd.Series, timezone: str) -> pd.DatetimeIndex:
+    """Read stamps in ISO 8601, local ones where they have no offset."""
+    with_offset = texts.str.contains(r"[T ]\d.*(?:Z|[+-]\d\d(?::?\d\d)?)\s*$")
+    if with_offset.any():  # over a change of clocks they differ
+        stamps = pd.DatetimeIndex(pd.to_datetime(texts, format="ISO8601", utc=True))
+    else:
+        naive = pd.DatetimeIndex(pd.to_datetime(texts, format="ISO8601"))
+        stamps = naive.tz_localize(timezone, ambiguous="infer")
+    bad = np.flatnonzero(~within_years(stamps))
+    if bad.size:
+        raise ValueError(f"{texts.iloc[bad[0]]!r} in row {bad[0] + 1}")
+    return stamps
 
 
 def _series(table: pd.DataFrame, name: str, clock: YearClock) -> NamedSeries:
@@ -207,10 +227,10 @@ def _series(table: pd.DataFrame, name: str, clock: YearClock) -> NamedSeries:
         if column == "time":
             seconds = clock.zero + table["time"].to_numpy(dtype=float)
         else:
-            stamps = pd.DatetimeIndex(pd.to_datetime(table["timestamp"]))
-            seconds = index_seconds(stamps if stamps.tz else stamps.tz_localize(clock.timezone)).astype(float)
+            seconds = index_seconds(_stamps(table["timestamp"].astype(str), clock.timezone)).astype(float)
     except (TypeError, ValueError) as error:
-        raise PlantError(f"series {name}: column {column!r}", "times", " ".join(str(error).split())) from error
+        advice = "write offsets or UTC, such as 2023-10-29 02:30+01:00" if column == "timestamp" else ""
+        raise PlantError(f"series {name}: column {column!r}", "times", " ".join(str(error).split()), advice) from error
     last = np.append(np.diff(seconds) != 0.0, True)  # of equal times: what holds from then on
     rising = last.sum() > 1 and bool((np.diff(seconds[last]) > 0.0).all())
     PlantError.unless(rising, f"series {name}: column {column!r}", "two or more rising times", f"{len(seconds)} others")
