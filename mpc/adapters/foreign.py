@@ -260,6 +260,8 @@ class SignalPlant(ForeignPlant):
         States such as temperatures lie on straight lines between readings. All else may jump when an input does, at
         the begin of the step: it is what it is at the end of each part.
         """
+        if not rows.size:  # nothing is measured
+            return Measurements(self._layout, seconds, np.empty(0))
         lines, ends = 0.5 * (rows[1:] + rows[:-1]), rows[1:]
         return Measurements(self._layout, seconds, np.where(self._lines_between, lines, ends).mean(axis=0))
 

@@ -1,6 +1,6 @@
 """What drives a described plant from outside, as a scenario: weather, prices, emissions, people and comfort bands."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -38,24 +38,25 @@ class SeriesSource:
     tables : sequence of NamedSeries
         In this order.
     ahead : callable, optional
-        Makes series of names that no table has, all at once, on the grid that is asked for.
+        Makes series of names that no table has, all at once, on the grid that is asked for; it is told where each name
+        stands.
     """
 
     tables: Sequence[NamedSeries]
-    ahead: Callable[[Sequence[str], StepGrid], NamedSeries] | None = None
+    ahead: Callable[[Mapping[str, str], StepGrid], NamedSeries] | None = None
     _run: dict[str, NamedSeries] = field(default_factory=dict, init=False)
 
-    def prepare(self, names: Sequence[str], grid: StepGrid) -> None:
+    def prepare(self, names: Mapping[str, str], grid: StepGrid) -> None:
         """Run ahead once for all names that no table has.
 
         Parameters
         ----------
-        names : sequence of str
-            All that will be asked for.
+        names : mapping of str to str
+            Where each that will be asked for stands.
         grid : StepGrid
             Steps.
         """
-        missing = [name for name in dict.fromkeys(names) if not any(name in table.values for table in self.tables)]
+        missing = {name: where for name, where in names.items() if not any(name in t.values for t in self.tables)}
         if missing and self.ahead is not None:
             self._run.update(dict.fromkeys(missing, self.ahead(missing, grid)))
 
@@ -307,12 +308,19 @@ def _weather(file: PlantFile, folder: Path, source: SeriesSource, grid: StepGrid
     return Weather(pd.DataFrame(columns, index=grid.stamps), file.location, step=grid.step)
 
 
-def _names(file: PlantFile) -> list[str]:
-    """Names of all series that a description asks for."""
-    asked: list[object] = [zone.people for zone in file.zones.values()]
-    asked += [edge for zone in file.zones.values() if zone.comfort for edge in (zone.comfort.lower, zone.comfort.upper)]
-    for part in (file.prices, file.emissions):
-        asked += [] if part is None else [part.electricity, part.gas]
+def _names(file: PlantFile) -> dict[str, str]:
+    """Names of all series that a description asks for, and where each stands first."""
+    asked: dict[str, object] = {}
+    for name, zone in file.zones.items():
+        edges = {} if zone.comfort is None else {"lower": zone.comfort.lower, "upper": zone.comfort.upper}
+        asked |= {f"zones.{name}.comfort.{edge}": value for edge, value in edges.items()}
+        asked[f"zones.{name}.people"] = zone.people
+    for key, part in (("prices", file.prices), ("emissions", file.emissions)):
+        asked |= {} if part is None else {f"{key}.electricity": part.electricity, f"{key}.gas": part.gas}
     if isinstance(file.weather, dict):
-        asked += [signal.signal for signal in file.weather.values() if isinstance(signal, Signal)]
-    return [name for name in asked if isinstance(name, str)]
+        asked |= {f"weather.{point}": signal.signal for point, signal in file.weather.items()}
+    found: dict[str, str] = {}
+    for where, value in asked.items():
+        if isinstance(value, str):
+            found.setdefault(value, where)
+    return found

@@ -10,6 +10,7 @@ from thermal.case.building import Entry, Location, Number, Positive, Text
 from thermal.errors import CaseError
 from thermal.units import to_si
 
+_NUMBER = re.compile(r"\s*[-+]?[0-9.]+(?:[eE][-+]?\d+)?\s*")
 _WITH_UNIT = re.compile(r"\s*([-+]?[0-9.]+(?:[eE][-+]?\d+)?)\s*([A-Za-z°]\S*)\s*")
 
 
@@ -42,6 +43,8 @@ def _branch(value: Any) -> str | None:
     """Tell a number, a name and a table of hours apart."""
     if isinstance(value, bool):
         return None
+    if isinstance(value, str) and _NUMBER.fullmatch(value):
+        return None  # in quotes by mistake
     kinds = ((float | int, "<number>"), (str, "<name>"), (dict, "<hours>"))
     return next((tag for kind, tag in kinds if isinstance(value, kind)), None)
 
@@ -232,14 +235,14 @@ class Outlook(Entry):
     Parameters
     ----------
     hours : float
-        How far they reach [h].
+        How far they reach, up to a year [h].
     errors : {"none", "day_ahead"}
         Whether the weather is known, or wrong as `mpc.scenario.forecast.DAY_AHEAD_ERRORS`.
     seed : int
         Of the errors.
     """
 
-    hours: Positive = 24.0
+    hours: Annotated[Number, Field(gt=0, le=8784)] = 24.0
     errors: Literal["none", "day_ahead"] = "none"
     seed: Annotated[int, Field(ge=0, strict=True)] = 0
 
@@ -252,14 +255,15 @@ class Period(Entry):
     start : str
         ISO 8601, local.
     days : float
-        Length [d].
+        Length, up to ten years [d].
     warm_up_days : float
-        Before the start, under the building's own control [d].
+        Before the start, under the building's own control, up to a year [d]; from the begin of the start's year at the
+        earliest, as BOPTEST's.
     """
 
     start: Annotated[Text, BeforeValidator(_text)]
-    days: Positive
-    warm_up_days: Annotated[Number, Field(ge=0)] = 0.0
+    days: Annotated[Number, Field(gt=0, le=3660)]
+    warm_up_days: Annotated[Number, Field(ge=0, le=366)] = 0.0
 
 
 class UnitProgram(Entry):
@@ -276,14 +280,14 @@ class UnitProgram(Entry):
     parameters : mapping of str to float
         Of the unit, start values and inputs that are held [their declared units].
     communication_step : float
-        Longest time between two readings [s].
+        Longest time between two readings [s], a millisecond or more.
     """
 
     kind: Literal["fmu"]
     file: Text
     interface: Literal["co-simulation", "model exchange"] | None = None
     parameters: dict[Text, Number] = Field(default_factory=dict)
-    communication_step: Positive = 30.0
+    communication_step: Annotated[Number, Field(ge=1e-3)] = 30.0
 
 
 class ServerProgram(Entry):
@@ -346,7 +350,7 @@ class PlantFile(Entry):
     plant : UnitProgram, ServerProgram or EnergyPlusProgram
         What stands for the building.
     control_step : float
-        Time between two actions [s].
+        Time between two actions, a second or more [s].
     period : str or Period
         When it runs; a name is one of BOPTEST's time periods, such as ``peak_heat_day``.
     zones : mapping of str to Zone
@@ -376,7 +380,7 @@ class PlantFile(Entry):
     location: Location
     year: Annotated[int, Field(ge=1900, le=2200, strict=True)] = 2023
     plant: Annotated[UnitProgram | ServerProgram | EnergyPlusProgram, Field(discriminator="kind")]
-    control_step: Positive
+    control_step: Annotated[Number, Field(ge=1)]
     period: Annotated[
         Annotated[Text, Tag("<name>")] | Annotated[Period, Tag("<period>")],
         Discriminator(

@@ -14,8 +14,8 @@ import pytest
 import yaml
 
 from mpc.adapters.boptest.scenario import YearClock
-from mpc.adapters.described.load import READY, _mappings, load_plant, ready_plants
-from mpc.adapters.described.schema import PlantFile
+from mpc.adapters.described.load import READY, _mappings, _span, load_plant, ready_plants
+from mpc.adapters.described.schema import Period, PlantFile
 from mpc.adapters.described.series import NamedSeries, read_table, unit_period
 from mpc.adapters.fmu.plant import FmuSignals
 from mpc.errors import MpcError, PlantActionError, PlantError
@@ -214,6 +214,15 @@ EDITS: list[tuple[dict[str, Any], str]] = [
     ({"prices": {"electricity": True}}, "prices.electricity: expected a number, the name of a series, or hours"),
     ({"prices": {"electricity": {"weekday": [0.1]}}}, "prices.electricity.weekday"),
     ({"prices": {"electricity": "spott"}}, "prices.electricity: expected a series of prices.csv, found 'spott'; the nea"),
+    ({"prices": {"electricity": "0.25"}}, "prices.electricity: expected a number, the name of a series, or hours"),
+    ({"prices": {"electricity": "spott"}, "series": ["prices.csv", "outputs"]},
+     "FMU house.fmu: series of prices.electricity: expected a variable, found 'spott'"),
+    ({"period": {"start": "NaT", "days": 1}}, "period.start: expected a local time"),
+    ({"period": {"start": "1500-01-01", "days": 1}}, "of the years 1"),
+    ({"period": {"start": "2023-01-11", "days": 1e9}}, "period.days: expected less than or equal to 3660"),
+    ({"control_step": 1e-6}, "control_step: expected greater than or equal to 1"),
+    ({"forecast": {"hours": 1e9}}, "forecast.hours: expected less than or equal to 8784"),
+    ({"plant": {"kind": "fmu", "file": "house.fmu", "communication_step": 1e-9}}, "communication_step: expected greater than or equal to 0.001"),
     ({"prices": None}, "prices: expected those of electricity beside the weather, found none"),
     ({"weather": {"outdoor": "spot"}}, "weather.outdoor: expected a point of the weather station, found 'outdoor'"),
     ({"period": {"start": "soon", "days": 1}}, "period.start: expected a local time such as 2023-01-09 00:00"),
@@ -232,7 +241,7 @@ EDITS: list[tuple[dict[str, Any], str]] = [
 @pytest.mark.parametrize(("changes", "says"), EDITS, ids=[says[:40] for _, says in EDITS])
 def test_descriptions_that_do_not_fit(folder: Path, changes: Mapping[str, Any], says: str) -> None:
     changed = dict(changes)
-    if changed.get("prices", {}) == {"electricity": "spott"}:
+    if changed == {"prices": {"electricity": "spott"}}:
         changed["series"] = ["prices.csv"]
         changed["weather"] = {"outside_air_temperature_sensor": {"signal": "spot", "unit": "degC"}}
     (folder / "heat.csv").write_text("timestamp,heat\n2023-01-10,21\n2023-01-14,21\n")
@@ -298,3 +307,8 @@ def test_files_that_are_none(tmp_path: Path) -> None:
     (tmp_path / "list.yaml").write_text("- 1\n")
     with pytest.raises(PlantError, match="list.yaml: expected a mapping of keys, found list"):
         load_plant(tmp_path / "list.yaml")
+
+
+def test_a_warm_up_begins_with_the_year_at_the_earliest() -> None:
+    clock, span = _span(Period(start="2023-01-03", days=1, warm_up_days=7), "Europe/Brussels")
+    assert clock.year == 2023 and span == (2 * 86_400.0, 86_400.0, 2 * 86_400.0)
