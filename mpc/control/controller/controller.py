@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from mpc.control.controller.observer import Observer
+from mpc.control.controller.ranges import READINGS
 from mpc.control.controller.site import Action, ControllerSettings, Reading, SitePoints, Source
 from mpc.control.controller.watch import FarFromModel, PossibleReadings, StuckSensors, explain_comfort
 from mpc.control.problem.assembly import DemandCount, Expected, expect
@@ -325,7 +326,7 @@ def _possible(forecast: Forecast | None, reasons: list[str]) -> Forecast | None:
     """Take out of a forecast what cannot be; it counts as missing."""
     if forecast is None:
         return None
-    kept = possible_values(forecast.table)
+    kept = possible_values(forecast.table, READINGS)
     lost = forecast.table.notna() & kept.isna()
     for column in forecast.table.columns[lost.any()]:
         reasons.append(f"forecast of {column}: {int(lost[column].sum())} values that cannot be count as missing")

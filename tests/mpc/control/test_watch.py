@@ -6,8 +6,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from mpc.control.controller.site import values_of
 from mpc.control.controller.watch import FarFromModel, PossibleReadings, StuckSensors
 from mpc.errors import ControlError
+from thermal.case.points import POINT_TYPES
 
 ZONES = ("hall", "lab", "loft")
 
@@ -80,3 +82,24 @@ def test_a_step_with_a_wrong_clock_does_not_last() -> None:
     assert watch.memory[column] == (293.15, summer)
     assert np.isnan(watch.update({column: 250.0}, summer + pd.Timedelta(minutes=5), said)[column])
     assert "faster than it can move" in said[0]
+
+
+@pytest.mark.parametrize(
+    ("point", "value", "never"),
+    [
+        ("zone_air_temperature_sensor", 248.15, 233.15),  # a cold store; what a failed sensor reads
+        ("supply_water_temperature_sensor", 457.15, 6553.5),
+        ("heating_power_sensor", -1.5e6, 1e9),
+        ("differential_pressure_sensor", 1.2e6, 1e7),
+        ("discharge_air_temperature_sensor", 242.0, 0.0),
+        ("wind_direction_sensor", 361.0, 999.0),
+    ],
+)
+def test_a_controller_takes_what_plants_have(point: str, value: float, never: float) -> None:
+    """Beyond the ranges by which telemetry is judged, which stay as they are."""
+    column, said = f"a/{point}", list[str]()
+    for reading, taken in ((value, True), (never, False)):
+        watch = PossibleReadings([column])
+        seen = watch.update({column: reading}, pd.Timestamp("2026-01-10", tz="UTC"), said)
+        assert np.isfinite(seen[column]) == np.isfinite(values_of({column: reading}, ["a"], point)[0]) == taken
+    assert len(said) == 1 and not POINT_TYPES[point].possible(value)
