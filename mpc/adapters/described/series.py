@@ -19,6 +19,10 @@ from thermal._types import FloatArray
 from thermal.case.years import within_years
 from thermal.errors import nearest
 
+# A series is regular where so many of its steps are the usual one [-], and has a hole where one is longer than so many
+# of it [-]: a tariff's changes, whose steps differ, may hold for weeks; an hourly table may lack a night.
+_REGULAR, _HOLE = 0.9, 12.0
+
 
 @dataclass(frozen=True, eq=False)
 class NamedSeries:
@@ -58,18 +62,32 @@ class NamedSeries:
         ScenarioError
             When it does not cover the grid.
         PlantError
-            When a value is missing.
+            When a value is missing, or rows of a regular series.
         """
         values, times, edges = self.values[name], self.seconds, grid.edges.astype(float)
         where = f"series {name} of {self.where}"
         bad = int((~np.isfinite(values)).sum())
         PlantError.unless(not bad, where, "a value at each time", f"{bad} missing of {len(values)}")
-        last = times[-1] if lines else 2.0 * times[-1] - times[-2]
+        usual = float(np.median(np.diff(times)))
+        last = times[-1] if lines else times[-1] + usual
+        _without_holes(times, usual, edges, where)
         require_cover(grid, float(times[0]), float(last), where, ScenarioError)
         if lines:
             integral = make_interp_spline(times - times[0], values, k=1).antiderivative()
             return np.asarray(np.diff(integral(edges - times[0])) / np.diff(edges))
         return means_of_steps(np.append(times, last), values, edges)
+
+
+def _without_holes(times: FloatArray, usual: float, edges: FloatArray, where: str) -> None:
+    """Refuse a hole within a grid, of a series that is regular elsewhere; one of changes only has none."""
+    steps = np.diff(times)
+    if (np.abs(steps - usual) < 1.0).mean() < _REGULAR:
+        return
+    holes = np.flatnonzero((steps > _HOLE * usual) & (times[:-1] < edges[-1]) & (times[1:] > edges[0]))
+    if holes.size:
+        stamp = pd.Timestamp(times[holes[0]], unit="s", tz="UTC")
+        found = f"{steps[holes[0]] / 3600.0:.4g} h without after {stamp:%Y-%m-%d %H:%M} UTC"
+        raise PlantError(where, f"rows every {usual:g} s", found, "repeat the value where it holds")
 
 
 def read_table(path: Path, name: str, clock: YearClock) -> NamedSeries:
@@ -93,8 +111,11 @@ def read_table(path: Path, name: str, clock: YearClock) -> NamedSeries:
     PlantError.unless(path.is_file(), f"series {name}", "a .csv file", "no such file")
     try:
         table = pd.read_csv(path, comment="#")
+        header = pd.read_csv(path, comment="#", header=None, nrows=1, dtype=str).iloc[0]
     except (OSError, ValueError) as error:
         raise PlantError(f"series {name}", "a table of comma-separated values", str(error)) from error
+    twice = header[header.duplicated()]
+    PlantError.unless(twice.empty, f"series {name}", "a name of its own for each column", f"{[*twice]} again")
     return _series(table, name, clock)
 
 

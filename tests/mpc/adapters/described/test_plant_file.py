@@ -312,3 +312,26 @@ def test_files_that_are_none(tmp_path: Path) -> None:
 def test_a_warm_up_begins_with_the_year_at_the_earliest() -> None:
     clock, span = _span(Period(start="2023-01-03", days=1, warm_up_days=7), "Europe/Brussels")
     assert clock.year == 2023 and span == (2 * 86_400.0, 86_400.0, 2 * 86_400.0)
+
+
+def test_holes_of_tables_are_not_bridged(tmp_path: Path) -> None:
+    """An hourly table that lacks a day is refused where it is asked for it; its last row holds for an hour."""
+    hours = np.delete(np.arange(0.0, 240.0), np.arange(100, 124))
+    start = pd.Timestamp("2023-01-01", tz="UTC")
+    series = NamedSeries("p.csv", start.timestamp() + 3600.0 * hours, {"spot": np.ones(len(hours))})
+
+    def grid(first: float, hours: int) -> StepGrid:
+        return StepGrid(start + pd.Timedelta(hours=first), 3600.0, hours)
+
+    np.testing.assert_array_equal(series.on("spot", grid(0, 99), lines=False), 1.0)
+    np.testing.assert_array_equal(series.on("spot", grid(130, 110), lines=False), 1.0)
+    with pytest.raises(PlantError, match="rows every 3600 s, found 25 h without after 2023-01-05 03:00 UTC"):
+        series.on("spot", grid(90, 24), lines=False)
+    ends = NamedSeries("p.csv", np.append(series.seconds[:50], series.seconds[50] + 7200.0), {"spot": np.ones(51)})
+    with pytest.raises(MpcError, match="spot of p.csv"):
+        ends.on("spot", grid(50, 4), lines=False)
+    changes = NamedSeries("c.csv", start.timestamp() + 3600.0 * np.array([0, 7, 22, 31, 240]), {"spot": np.ones(5)})
+    np.testing.assert_array_equal(changes.on("spot", grid(0, 240), lines=False), 1.0)
+    (tmp_path / "p.csv").write_text("time,spot,spot\n0,1,2\n3600,1,2\n")
+    with pytest.raises(PlantError, match="a name of its own for each column, found .'spot'. again"):
+        read_table(tmp_path / "p.csv", "p.csv", YearClock(2023, "UTC"))
