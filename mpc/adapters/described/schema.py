@@ -16,10 +16,8 @@ _WITH_UNIT = re.compile(r"\s*([-+]?[0-9.]+(?:[eE][-+]?\d+)?)\s*([A-Za-z°]\S*)\s
 
 def _kelvin(value: Any) -> Any:
     """Bring text such as ``21 degC`` into kelvin, in tables of hours too; leave all else."""
-    if isinstance(value, dict):
-        return {key: _kelvin(part) for key, part in value.items()}
-    if isinstance(value, list | tuple):
-        return [_kelvin(part) for part in value]
+    if isinstance(value, dict | list | tuple):
+        return {k: _kelvin(v) for k, v in value.items()} if isinstance(value, dict) else [_kelvin(v) for v in value]
     found = _WITH_UNIT.fullmatch(value) if isinstance(value, str) else None
     if found is None:
         return value
@@ -41,10 +39,8 @@ def _text(value: Any) -> Any:
 
 def _branch(value: Any) -> str | None:
     """Tell a number, a name and a table of hours apart."""
-    if isinstance(value, bool):
+    if isinstance(value, bool) or (isinstance(value, str) and _NUMBER.fullmatch(value)):  # in quotes by mistake
         return None
-    if isinstance(value, str) and _NUMBER.fullmatch(value):
-        return None  # in quotes by mistake
     kinds = ((float | int, "<number>"), (str, "<name>"), (dict, "<hours>"))
     return next((tag for kind, tag in kinds if isinstance(value, kind)), None)
 
@@ -257,8 +253,7 @@ class Period(Entry):
     days : float
         Length, up to ten years [d].
     warm_up_days : float
-        Before the start, under the building's own control, up to a year [d]; from the begin of the start's year at the
-        earliest, as BOPTEST's.
+        Before the start, under the building's own control, up to a year, within the start's year [d].
     """
 
     start: Annotated[Text, BeforeValidator(_text)]
