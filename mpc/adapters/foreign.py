@@ -55,7 +55,8 @@ class ForeignSignals:
     Raises
     ------
     PlantError
-        When there is no zone, a column is of no known point, or a limit, kind, minimum or release is of no actuator.
+        When there is no zone, a column is of no known point, two actuators are one input, a limit, kind, minimum or
+        release is of no actuator, or a limit is beyond its point.
     """
 
     measurements: Mapping[str, str]
@@ -84,6 +85,14 @@ class ForeignSignals:
         for name, pair in self.limits.items():
             finite = -math.inf < pair[0] < pair[1] < math.inf
             self._error.unless(finite, f"limits: {name}", "a lower and a higher number", repr(pair))
+            kind = POINT_TYPES.get(name.rpartition("/")[2])
+            if kind is not None and not kind.possible(pair).all():
+                expected = f"numbers from {kind.lowest:g} to {kind.highest:g}, in the library's unit"
+                raise self._error(f"limits: {name}", expected, f"{pair[0]:g} to {pair[1]:g}")
+        by_signal: dict[str, str] = {}
+        for name, signal in self.actuators.items():
+            other = by_signal.setdefault(signal, name)
+            self._error.unless(other == name, f"actuators: {name}", "an input of its own", f"{signal!r} of {other}")
 
     def activations(self, inputs: Collection[str]) -> dict[str, str]:
         """Find the input that hands each actuator over, where it has one.
@@ -251,6 +260,8 @@ class SignalPlant(ForeignPlant):
         States such as temperatures lie on straight lines between readings. All else may jump when an input does, at
         the begin of the step: it is what it is at the end of each part.
         """
+        if not rows.size:  # nothing is measured
+            return Measurements(self._layout, seconds, np.empty(0))
         lines, ends = 0.5 * (rows[1:] + rows[:-1]), rows[1:]
         return Measurements(self._layout, seconds, np.where(self._lines_between, lines, ends).mean(axis=0))
 

@@ -32,11 +32,15 @@ P = ParamSpec("P")
 #: Exit codes of the contract: success is 0.
 FAILURE, BAD_INPUT = 1, 2
 
+#: What typer ends with on Ctrl-C: 128 and the signal's number, as shells have it.
+INTERRUPTED = 130
+
 #: Error of the command line itself, such as an option that there is not.
 _USAGE: Any = typer.BadParameter.__base__
 
-#: What a message says to a caller of the Python function, in brackets behind the option of the command.
-_KEYWORD = re.compile(r" \(\w+=\w+\)")
+#: What a message says to a caller of the Python function, in brackets behind the option of the command. What is in
+#: brackets elsewhere may be part of a path.
+_KEYWORD = re.compile(r"(?<= --force) \(\w+=True\)")
 
 _settings: dict[str, Any] = {"debug": False, "plugins": []}
 
@@ -69,6 +73,8 @@ def options(
         typer.echo(dumps(found) if json else f"{found['name']} {found['version']}")
         raise typer.Exit
     if context.invoked_subcommand is None:
+        if json:
+            raise _USAGE("Missing command.", context)
         typer.echo(context.get_help())
         raise typer.Exit
 
@@ -124,11 +130,14 @@ def main() -> None:
     if "--json" not in sys.argv:
         app()
     try:
-        sys.exit(app(standalone_mode=False))
+        code = app(standalone_mode=False)
     except _USAGE as error:
         error.show()
         content = {"name": "UsageError", "message": error.format_message(), "exit_code": error.exit_code}
         typer.echo(dumps({"error": content}))
         sys.exit(error.exit_code)
     except typer.Abort:
-        sys.exit(FAILURE)
+        code = INTERRUPTED
+    if code == INTERRUPTED:
+        typer.echo(dumps({"error": {"name": "Interrupted", "message": "stopped by Ctrl-C", "exit_code": code}}))
+    sys.exit(code)

@@ -315,8 +315,7 @@ class ComfortBand:
     def __post_init__(self) -> None:
         for name in ("occupied", "unoccupied"):
             lower, upper = getattr(self, name)
-            rising, expected = 223.15 <= lower < upper <= 373.15, "a lower and an upper temperature in K"
-            ScenarioError.unless(rising, f"comfort: {name}", expected, f"{lower:g} to {upper:g}")
+            require_band(lower, upper, f"comfort: {name}")
         for name in ("weekday", "saturday", "sunday"):
             hours = getattr(self, name)
             rising = hours is None or 0.0 <= hours[0] < hours[1] <= 24.0
@@ -348,3 +347,25 @@ class ComfortBand:
         occupied = self.occupied_share(grid) > 0.0
         lower, upper = (np.where(occupied, self.occupied[side], self.unoccupied[side]).astype(float) for side in (0, 1))
         return lower, upper
+
+
+def require_band(lower: ArrayLike, upper: ArrayLike, where: str) -> None:
+    """Refuse a band that is empty, or in other units than kelvin.
+
+    Parameters
+    ----------
+    lower, upper : float or ndarray
+        Edges, of the same shape [K].
+    where : str
+        What it is, for the message.
+
+    Raises
+    ------
+    ScenarioError
+        When it is, at any time.
+    """
+    low, high = np.atleast_1d(lower), np.atleast_1d(upper)
+    wrong = np.flatnonzero(~((low >= 223.15) & (low < high) & (high <= 373.15)))
+    expected = "a lower and an upper temperature in K"
+    found = f"{low[wrong[0]]:g} to {high[wrong[0]]:g}" if wrong.size else ""
+    ScenarioError.unless(not wrong.size, where, expected, found)

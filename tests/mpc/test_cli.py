@@ -137,6 +137,8 @@ def test_an_unexpected_error_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> No
     [
         (("check", "/nowhere"), "CaseError", "expected a case folder, found nothing"),
         (("check", CASE, "--spam"), "UsageError", "No such option: --spam"),
+        ((), "UsageError", "Missing command."),
+        (("check", "/nowhere (a=b)"), "CaseError", "/nowhere (a=b)"),
         (("chek",), "UsageError", "No such command 'chek'. Did you mean 'check'?"),
         (("evaluate", CASE, "--out", "/proc/results"), "CalibrationError", "expected a place that can be written to"),
     ],
@@ -149,6 +151,18 @@ def test_with_json_an_error_is_json(words: tuple[Any, ...], name: str, told: str
     error = json.loads(out)["error"]
     assert (error["name"], error["exit_code"], ended.value.code) == (name, 2, 2) and told in error["message"]
     assert "Traceback" not in err and told in err
+
+
+def test_with_json_an_interruption_is_json(capsys, monkeypatch) -> None:
+    def stopped(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("mpc.cli.app.load_plugins", stopped)
+    monkeypatch.setattr("sys.argv", ["buildingmpc", "check", str(CASE), "--json"])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    error = json.loads(capsys.readouterr().out)["error"]
+    assert (error["name"], error["exit_code"], ended.value.code) == ("Interrupted", 130, 130)
 
 
 def test_the_version_as_text_and_as_json() -> None:

@@ -1,7 +1,7 @@
 """The point types of the case format: what each measures, and which values a sensor of it can report at all."""
 
 import csv
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -150,17 +150,19 @@ def split_column(column: str, where: str) -> tuple[str, str]:
     return entity, point_type(point, f"{where}: column {column!r}").name
 
 
-def possible_values(table: pd.DataFrame) -> pd.DataFrame:
+def possible_values(table: pd.DataFrame, types: Mapping[str, PointType] = POINT_TYPES) -> pd.DataFrame:
     """Leave out what no sensor of its point can read; columns that are no points stay as they are.
 
     Parameters
     ----------
     table
         Shape (n_time, n_column); columns end in the name of their point; in the library's units.
+    types
+        Of the points by name, with their ranges.
     """
     kept = table.copy()
     for position, column in enumerate(table.columns):
-        kind = POINT_TYPES.get(str(column).rpartition("/")[2])
+        kind = types.get(str(column).rpartition("/")[2])
         if kind is not None:
             values = table.iloc[:, position]
             kept.isetitem(position, values.where(kind.possible(values)).to_numpy())

@@ -15,7 +15,7 @@ from thermal.errors import nearest
 LONGEST_BODY = 1_000_000
 
 #: Most values that one answer holds.
-MOST_VALUES = 5_000_000
+MOST_VALUES = 1_000_000
 
 _FORM = "application/x-www-form-urlencoded"
 _MOST_FIELDS = 20_000

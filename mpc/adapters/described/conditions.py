@@ -1,6 +1,6 @@
 """What drives a described plant from outside, as a scenario: weather, prices, emissions, people and comfort bands."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from mpc.loop.conversion import conversion
 from mpc.scenario.forecast import DAY_AHEAD_ERRORS, Forecaster
 from mpc.scenario.gains import InternalGains
 from mpc.scenario.grid import StepGrid
-from mpc.scenario.occupancy import ComfortBand, Occupancy
+from mpc.scenario.occupancy import ComfortBand, Occupancy, require_band
 from mpc.scenario.rates import ConstantRate, HourlyRate, Rate
 from mpc.scenario.scenario import Scenario, build_scenario
 from mpc.scenario.tariff import CarbonIntensity, DemandCharge, Tariff
@@ -22,7 +22,7 @@ from mpc.scenario.weather import WEATHER_POINTS, Weather
 from mpc.scenario.weather_files import read_epw
 from thermal._types import FloatArray
 from thermal.case.building import Building, ZoneEntry, ZoneTable
-from thermal.case.points import OUTDOOR_TEMPERATURE
+from thermal.case.points import OUTDOOR_TEMPERATURE, POINT_TYPES, ZONE_TEMPERATURE
 from thermal.errors import nearest
 
 # Height of a zone whose volume is not given [m]: that of the test houses of ASHRAE Standard 140
@@ -38,24 +38,25 @@ class SeriesSource:
     tables : sequence of NamedSeries
         In this order.
     ahead : callable, optional
-        Makes series of names that no table has, all at once, on the grid that is asked for.
+        Makes series of names that no table has, all at once, on the grid that is asked for; it is told where each name
+        stands.
     """
 
     tables: Sequence[NamedSeries]
-    ahead: Callable[[Sequence[str], StepGrid], NamedSeries] | None = None
+    ahead: Callable[[Mapping[str, str], StepGrid], NamedSeries] | None = None
     _run: dict[str, NamedSeries] = field(default_factory=dict, init=False)
 
-    def prepare(self, names: Sequence[str], grid: StepGrid) -> None:
+    def prepare(self, names: Mapping[str, str], grid: StepGrid) -> None:
         """Run ahead once for all names that no table has.
 
         Parameters
         ----------
-        names : sequence of str
-            All that will be asked for.
+        names : mapping of str to str
+            Where each that will be asked for stands.
         grid : StepGrid
             Steps.
         """
-        missing = [name for name in dict.fromkeys(names) if not any(name in table.values for table in self.tables)]
+        missing = {name: where for name, where in names.items() if not any(name in t.values for t in self.tables)}
         if missing and self.ahead is not None:
             self._run.update(dict.fromkeys(missing, self.ahead(missing, grid)))
 
@@ -85,6 +86,35 @@ class SeriesSource:
             raise PlantError(where, f"a series of {told}", repr(name), nearest(name, known) if known else "")
         return found.on(name, grid, lines=lines)
 
+    def of_point(self, point: str, signal: Signal, grid: StepGrid, where: str, *, lines: bool) -> FloatArray:
+        """Average a series that stands for a point, shape (n_steps,) [library's unit].
+
+        Parameters
+        ----------
+        point : str
+            Of the case format.
+        signal : Signal
+            Which series; its unit, else that which is declared, is converted.
+        grid, where, lines
+            As of `on`.
+
+        Raises
+        ------
+        PlantError
+            When no source has it, or a value cannot be one of the point.
+        """
+        values, kind = self.on(signal.signal, grid, where, lines=lines), POINT_TYPES[point]
+        tables = (*self.tables, *self._run.values())
+        declared = next(table.units.get(signal.signal) for table in tables if signal.signal in table.values)
+        line = conversion(point, signal.signal, signal.unit or declared)
+        brought = np.asarray(line.offset + line.slope * values)
+        wrong = brought[~kind.possible(brought)]
+        expected = f"values from {kind.told(kind.lowest)} to {kind.told(kind.highest)}"
+        found = f"{kind.told(wrong[0])} of {signal.signal!r}" if wrong.size else ""
+        advice = "say its unit: {signal: ..., unit: ...}"
+        PlantError.unless(not wrong.size, where, expected, found, advice)
+        return brought
+
 
 @dataclass(frozen=True, eq=False)
 class NamedRate:
@@ -96,11 +126,14 @@ class NamedRate:
         Of series.
     name, where : str
         Which series, and where it stands.
+    point : str, optional
+        What it stands for, a point of the case format.
     """
 
     source: SeriesSource
     name: str
     where: str
+    point: str = ""
 
     def on(self, grid: StepGrid) -> FloatArray:
         """Average over each step of a grid, shape (n_steps,) [unit of the series].
@@ -110,6 +143,8 @@ class NamedRate:
         grid : StepGrid
             Steps.
         """
+        if self.point:
+            return self.source.of_point(self.point, Signal(signal=self.name), grid, self.where, lines=False)
         return self.source.on(self.name, grid, self.where, lines=False)
 
 
@@ -121,10 +156,13 @@ class SeriesBand(ComfortBand):
     ----------
     lower, upper : Rate
         Edges [K].
+    where : str
+        Where they stand, for messages.
     """
 
     lower: Rate = field(default_factory=lambda: ConstantRate(294.15))
     upper: Rate = field(default_factory=lambda: ConstantRate(297.15))
+    where: str = "comfort"
 
     def on(self, grid: StepGrid) -> tuple[FloatArray, FloatArray]:
         """Lower and upper edge over each step, shape (n_steps,) each [K].
@@ -133,8 +171,15 @@ class SeriesBand(ComfortBand):
         ----------
         grid : StepGrid
             Steps.
+
+        Raises
+        ------
+        ScenarioError
+            When they are no band at any time.
         """
-        return self.lower.on(grid), self.upper.on(grid)
+        lower, upper = self.lower.on(grid), self.upper.on(grid)
+        require_band(lower, upper, self.where)
+        return lower, upper
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,10 +263,10 @@ def _scenario(file: PlantFile, folder: Path, source: SeriesSource, grid: StepGri
     if prices is None:
         raise PlantError("prices", "those of electricity beside the weather", "none", "name a price, or drop `weather`")
 
-    def rate(value: Value, where: str) -> Rate:
+    def rate(value: Value, where: str, point: str = "") -> Rate:
         if isinstance(value, Hours):
             return HourlyRate(value.weekday, value.weekend)
-        return NamedRate(source, value, where) if isinstance(value, str) else ConstantRate(float(value))
+        return NamedRate(source, value, where, point) if isinstance(value, str) else ConstantRate(float(value))
 
     source.prepare(_names(file), grid)
     weather = _weather(file, folder, source, grid)
@@ -242,11 +287,12 @@ def _scenario(file: PlantFile, folder: Path, source: SeriesSource, grid: StepGri
     )  # fmt: skip
 
 
-def _band(comfort: Comfort | None, rate: Callable[[Value, str], Rate], where: str) -> ComfortBand:
+def _band(comfort: Comfort | None, rate: Callable[[Value, str, str], Rate], where: str) -> ComfortBand:
     if comfort is None:
         return ComfortBand()
     if comfort.lower is not None and comfort.upper is not None:
-        return SeriesBand(lower=rate(comfort.lower, f"{where}.lower"), upper=rate(comfort.upper, f"{where}.upper"))
+        lower = rate(comfort.lower, f"{where}.lower", ZONE_TEMPERATURE)
+        return SeriesBand(lower=lower, upper=rate(comfort.upper, f"{where}.upper", ZONE_TEMPERATURE), where=where)
     hours = {day: getattr(comfort, day) for day in ("weekday", "saturday", "sunday")}
     occupied, other = comfort.occupied or (0.0, 0.0), comfort.unoccupied or (0.0, 0.0)
     return ComfortBand(occupied, other, **hours)
@@ -258,17 +304,23 @@ def _weather(file: PlantFile, folder: Path, source: SeriesSource, grid: StepGrid
     columns = {}
     for point, signal in (file.weather or {}).items():
         PlantError.unless_known(point, WEATHER_POINTS, f"weather.{point}", "a point of the weather station")
-        line = conversion(point, signal.signal, signal.unit)
-        columns[point] = line.offset + line.slope * source.on(signal.signal, grid, f"weather.{point}", lines=True)
+        columns[point] = source.of_point(point, signal, grid, f"weather.{point}", lines=True)
     return Weather(pd.DataFrame(columns, index=grid.stamps), file.location, step=grid.step)
 
 
-def _names(file: PlantFile) -> list[str]:
-    """Names of all series that a description asks for."""
-    asked: list[object] = [zone.people for zone in file.zones.values()]
-    asked += [edge for zone in file.zones.values() if zone.comfort for edge in (zone.comfort.lower, zone.comfort.upper)]
-    for part in (file.prices, file.emissions):
-        asked += [] if part is None else [part.electricity, part.gas]
+def _names(file: PlantFile) -> dict[str, str]:
+    """Names of all series that a description asks for, and where each stands first."""
+    asked: dict[str, object] = {}
+    for name, zone in file.zones.items():
+        edges = {} if zone.comfort is None else {"lower": zone.comfort.lower, "upper": zone.comfort.upper}
+        asked |= {f"zones.{name}.comfort.{edge}": value for edge, value in edges.items()}
+        asked[f"zones.{name}.people"] = zone.people
+    for key, part in (("prices", file.prices), ("emissions", file.emissions)):
+        asked |= {} if part is None else {f"{key}.electricity": part.electricity, f"{key}.gas": part.gas}
     if isinstance(file.weather, dict):
-        asked += [signal.signal for signal in file.weather.values() if isinstance(signal, Signal)]
-    return [name for name in asked if isinstance(name, str)]
+        asked |= {f"weather.{point}": signal.signal for point, signal in file.weather.items()}
+    found: dict[str, str] = {}
+    for where, value in asked.items():
+        if isinstance(value, str):
+            found.setdefault(value, where)
+    return found

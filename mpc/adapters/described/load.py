@@ -1,7 +1,7 @@
 """A plant of its description."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,6 +21,7 @@ from mpc.adapters.fmu.unit import Unit
 from mpc.errors import PlantError
 from mpc.scenario.grid import StepGrid
 from thermal.case.schema_file import read_mapping, schema_error
+from thermal.case.years import EXPECTED, within_years
 
 #: Descriptions that the library brings: test cases of BOPTEST by name.
 READY = Path(__file__).parent / "cases"
@@ -110,12 +111,18 @@ def _mappings(file: PlantFile) -> dict[str, Any]:
     """Collect what all kinds of signals have in common."""
     inputs = file.actuators
     signals = [*file.measurements.values(), *inputs.values(), *(zone.temperature for zone in file.zones.values())]
+    units: dict[str, str] = {}
+    for signal in signals:
+        if signal.unit is not None:
+            unit = units.setdefault(signal.signal, signal.unit)
+            where, expected = f"signal {signal.signal!r}", f"one unit, {unit!r}"
+            PlantError.unless(unit == signal.unit, where, expected, repr(signal.unit))
     return {
         "measurements": {column: signal.signal for column, signal in file.measurements.items()},
         "actuators": {name: entry.signal for name, entry in inputs.items()},
         "zones": {name: zone.temperature.signal for name, zone in file.zones.items()},
         **file.energy.model_dump(),
-        "units": {signal.signal: signal.unit for signal in signals if signal.unit is not None},
+        "units": units,
         "limits": {name: entry.range for name, entry in inputs.items() if entry.range is not None},
         "kinds": {name: entry.kind for name, entry in inputs.items() if entry.kind is not None},
         "minimums": {name: entry.minimum for name, entry in inputs.items() if entry.minimum is not None},
@@ -127,11 +134,15 @@ def _span(period: Period, timezone: str) -> tuple[YearClock, _Span]:
     """Tell the clock and the run of a period that is given by its start."""
     try:
         stamp = pd.Timestamp(period.start)
+        if not within_years(pd.DatetimeIndex([stamp]))[0]:
+            raise ValueError(EXPECTED)
         start = stamp.tz_convert(timezone) if stamp.tzinfo else stamp.tz_localize(timezone)
     except (ValueError, TypeError) as error:
-        raise PlantError("period.start", "a local time such as 2023-01-09 00:00", repr(period.start)) from error
+        expected = f"a local time such as 2023-01-09 00:00, of the {EXPECTED.partition('of the ')[2]}"
+        raise PlantError("period.start", expected, repr(period.start)) from error
     clock = YearClock(start.year, timezone)
-    return clock, _Span(clock.time(start.timestamp()), period.days * DAY, period.warm_up_days * DAY)
+    begin = clock.time(start.timestamp())
+    return clock, _Span(begin, period.days * DAY, min(period.warm_up_days * DAY, max(begin, 0.0)))
 
 
 def _unit_plant(file: PlantFile, program: UnitProgram, folder: Path) -> FmuPlant:
@@ -192,11 +203,11 @@ def _source(
             PlantError.unless(name.endswith(".csv"), "series", expected, repr(name))
             tables.append(read_table(folder / name, name, clock))
 
-    def ahead(names: Sequence[str], grid: StepGrid) -> NamedSeries:
-        unit = Unit(path, program.interface)
+    def ahead(names: Mapping[str, str], grid: StepGrid) -> NamedSeries:
+        unit, kinds = Unit(path, program.interface), ("output", "local", "input", "calculatedParameter", "parameter")
         try:
-            for name in names:
-                unit.variable(name, ("output", "local", "input", "calculatedParameter", "parameter"), "series")
+            for name, where in names.items():
+                unit.variable(name, kinds, f"series of {where}")
             return run_ahead(unit, names, grid, clock, step, program.parameters)
         finally:
             unit.close()

@@ -10,11 +10,14 @@ from thermal.case.building import Entry, Location, Number, Positive, Text
 from thermal.errors import CaseError
 from thermal.units import to_si
 
+_NUMBER = re.compile(r"\s*[-+]?[0-9.]+(?:[eE][-+]?\d+)?\s*")
 _WITH_UNIT = re.compile(r"\s*([-+]?[0-9.]+(?:[eE][-+]?\d+)?)\s*([A-Za-z°]\S*)\s*")
 
 
 def _kelvin(value: Any) -> Any:
-    """Bring text such as ``21 degC`` into kelvin; leave all else."""
+    """Bring text such as ``21 degC`` into kelvin, in tables of hours too; leave all else."""
+    if isinstance(value, dict | list | tuple):
+        return {k: _kelvin(v) for k, v in value.items()} if isinstance(value, dict) else [_kelvin(v) for v in value]
     found = _WITH_UNIT.fullmatch(value) if isinstance(value, str) else None
     if found is None:
         return value
@@ -36,7 +39,7 @@ def _text(value: Any) -> Any:
 
 def _branch(value: Any) -> str | None:
     """Tell a number, a name and a table of hours apart."""
-    if isinstance(value, bool):
+    if isinstance(value, bool) or (isinstance(value, str) and _NUMBER.fullmatch(value)):  # in quotes by mistake
         return None
     kinds = ((float | int, "<number>"), (str, "<name>"), (dict, "<hours>"))
     return next((tag for kind, tag in kinds if isinstance(value, kind)), None)
@@ -228,14 +231,14 @@ class Outlook(Entry):
     Parameters
     ----------
     hours : float
-        How far they reach [h].
+        How far they reach, up to a year [h].
     errors : {"none", "day_ahead"}
         Whether the weather is known, or wrong as `mpc.scenario.forecast.DAY_AHEAD_ERRORS`.
     seed : int
         Of the errors.
     """
 
-    hours: Positive = 24.0
+    hours: Annotated[Number, Field(gt=0, le=8784)] = 24.0
     errors: Literal["none", "day_ahead"] = "none"
     seed: Annotated[int, Field(ge=0, strict=True)] = 0
 
@@ -248,14 +251,14 @@ class Period(Entry):
     start : str
         ISO 8601, local.
     days : float
-        Length [d].
+        Length, up to ten years [d].
     warm_up_days : float
-        Before the start, under the building's own control [d].
+        Before the start, under the building's own control, up to a year, within the start's year [d].
     """
 
     start: Annotated[Text, BeforeValidator(_text)]
-    days: Positive
-    warm_up_days: Annotated[Number, Field(ge=0)] = 0.0
+    days: Annotated[Number, Field(gt=0, le=3660)]
+    warm_up_days: Annotated[Number, Field(ge=0, le=366)] = 0.0
 
 
 class UnitProgram(Entry):
@@ -272,14 +275,14 @@ class UnitProgram(Entry):
     parameters : mapping of str to float
         Of the unit, start values and inputs that are held [their declared units].
     communication_step : float
-        Longest time between two readings [s].
+        Longest time between two readings [s], a millisecond or more.
     """
 
     kind: Literal["fmu"]
     file: Text
     interface: Literal["co-simulation", "model exchange"] | None = None
     parameters: dict[Text, Number] = Field(default_factory=dict)
-    communication_step: Positive = 30.0
+    communication_step: Annotated[Number, Field(ge=1e-3)] = 30.0
 
 
 class ServerProgram(Entry):
@@ -342,7 +345,7 @@ class PlantFile(Entry):
     plant : UnitProgram, ServerProgram or EnergyPlusProgram
         What stands for the building.
     control_step : float
-        Time between two actions [s].
+        Time between two actions, a second or more [s].
     period : str or Period
         When it runs; a name is one of BOPTEST's time periods, such as ``peak_heat_day``.
     zones : mapping of str to Zone
@@ -372,7 +375,7 @@ class PlantFile(Entry):
     location: Location
     year: Annotated[int, Field(ge=1900, le=2200, strict=True)] = 2023
     plant: Annotated[UnitProgram | ServerProgram | EnergyPlusProgram, Field(discriminator="kind")]
-    control_step: Positive
+    control_step: Annotated[Number, Field(ge=1)]
     period: Annotated[
         Annotated[Text, Tag("<name>")] | Annotated[Period, Tag("<period>")],
         Discriminator(

@@ -3,7 +3,7 @@
 import json
 import zipfile
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,12 @@ from mpc.adapters.fmu.unit import Unit
 from mpc.errors import PlantError, ScenarioError
 from mpc.scenario.grid import StepGrid, index_seconds, means_of_steps, require_cover
 from thermal._types import FloatArray
+from thermal.case.years import within_years
 from thermal.errors import nearest
+
+# A series is regular where so many of its steps are the usual one [-], and has a hole where one is longer than so many
+# of it [-]: a tariff's changes, whose steps differ, may hold for weeks; an hourly table may lack a night.
+_REGULAR, _HOLE = 0.9, 12.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,11 +36,14 @@ class NamedSeries:
         Since 1970 in UTC, rising [s].
     values : mapping of str to ndarray
         By name, shape (n_time,) [their own units].
+    units : mapping of str to str
+        By name, of those whose unit is declared.
     """
 
     where: str
     seconds: FloatArray
     values: Mapping[str, FloatArray]
+    units: Mapping[str, str] = field(default_factory=dict)
 
     def on(self, name: str, grid: StepGrid, *, lines: bool) -> FloatArray:
         """Average over the steps of a grid, shape (n_steps,) [unit of the series].
@@ -54,18 +62,32 @@ class NamedSeries:
         ScenarioError
             When it does not cover the grid.
         PlantError
-            When a value is missing.
+            When a value is missing, or rows of a regular series.
         """
         values, times, edges = self.values[name], self.seconds, grid.edges.astype(float)
         where = f"series {name} of {self.where}"
         bad = int((~np.isfinite(values)).sum())
         PlantError.unless(not bad, where, "a value at each time", f"{bad} missing of {len(values)}")
-        last = times[-1] if lines else 2.0 * times[-1] - times[-2]
+        usual = float(np.median(np.diff(times)))
+        last = times[-1] if lines else times[-1] + usual
+        _without_holes(times, usual, edges, where)
         require_cover(grid, float(times[0]), float(last), where, ScenarioError)
         if lines:
             integral = make_interp_spline(times - times[0], values, k=1).antiderivative()
             return np.asarray(np.diff(integral(edges - times[0])) / np.diff(edges))
         return means_of_steps(np.append(times, last), values, edges)
+
+
+def _without_holes(times: FloatArray, usual: float, edges: FloatArray, where: str) -> None:
+    """Refuse a hole within a grid, of a series that is regular elsewhere; one of changes only has none."""
+    steps = np.diff(times)
+    if (np.abs(steps - usual) < 1.0).mean() < _REGULAR:
+        return
+    holes = np.flatnonzero((steps > _HOLE * usual) & (times[:-1] < edges[-1]) & (times[1:] > edges[0]))
+    if holes.size:
+        stamp = pd.Timestamp(times[holes[0]], unit="s", tz="UTC")
+        found = f"{steps[holes[0]] / 3600.0:.4g} h without after {stamp:%Y-%m-%d %H:%M} UTC"
+        raise PlantError(where, f"rows every {usual:g} s", found, "repeat the value where it holds")
 
 
 def read_table(path: Path, name: str, clock: YearClock) -> NamedSeries:
@@ -89,8 +111,11 @@ def read_table(path: Path, name: str, clock: YearClock) -> NamedSeries:
     PlantError.unless(path.is_file(), f"series {name}", "a .csv file", "no such file")
     try:
         table = pd.read_csv(path, comment="#")
+        header = pd.read_csv(path, comment="#", header=None, nrows=1, dtype=str).iloc[0]
     except (OSError, ValueError) as error:
         raise PlantError(f"series {name}", "a table of comma-separated values", str(error)) from error
+    twice = header[header.duplicated()]
+    PlantError.unless(twice.empty, f"series {name}", "a name of its own for each column", f"{[*twice]} again")
     return _series(table, name, clock)
 
 
@@ -196,7 +221,23 @@ def run_ahead(
         rows.append(unit.get(listed))
     unit.end()
     columns = {name: np.array([row[name] for row in rows]) for name in listed}
-    return NamedSeries(f"outputs of {unit.name}", grid.edges[0] + step * np.arange(count + 1.0), columns)
+    declared = {name: unit.declared(unit.variables[name], "unit") for name in listed}
+    units = {name: told for name, told in declared.items() if told}
+    return NamedSeries(f"outputs of {unit.name}", grid.edges[0] + step * np.arange(count + 1.0), columns, units)
+
+
+def _stamps(texts: pd.Series, timezone: str) -> pd.DatetimeIndex:
+    """Read stamps in ISO 8601, local ones where they have no offset."""
+    with_offset = texts.str.contains(r"[T ]\d.*(?:Z|[+-]\d\d(?::?\d\d)?)\s*$")
+    if with_offset.any():  # over a change of clocks they differ
+        stamps = pd.DatetimeIndex(pd.to_datetime(texts, format="ISO8601", utc=True))
+    else:
+        naive = pd.DatetimeIndex(pd.to_datetime(texts, format="ISO8601"))
+        stamps = naive.tz_localize(timezone, ambiguous="infer")
+    bad = np.flatnonzero(~within_years(stamps))
+    if bad.size:
+        raise ValueError(f"{texts.iloc[bad[0]]!r} in row {bad[0] + 1}")
+    return stamps
 
 
 def _series(table: pd.DataFrame, name: str, clock: YearClock) -> NamedSeries:
@@ -207,10 +248,10 @@ def _series(table: pd.DataFrame, name: str, clock: YearClock) -> NamedSeries:
         if column == "time":
             seconds = clock.zero + table["time"].to_numpy(dtype=float)
         else:
-            stamps = pd.DatetimeIndex(pd.to_datetime(table["timestamp"]))
-            seconds = index_seconds(stamps if stamps.tz else stamps.tz_localize(clock.timezone)).astype(float)
+            seconds = index_seconds(_stamps(table["timestamp"].astype(str), clock.timezone)).astype(float)
     except (TypeError, ValueError) as error:
-        raise PlantError(f"series {name}: column {column!r}", "times", " ".join(str(error).split())) from error
+        advice = "write offsets or UTC, such as 2023-10-29 02:30+01:00" if column == "timestamp" else ""
+        raise PlantError(f"series {name}: column {column!r}", "times", " ".join(str(error).split()), advice) from error
     last = np.append(np.diff(seconds) != 0.0, True)  # of equal times: what holds from then on
     rising = last.sum() > 1 and bool((np.diff(seconds[last]) > 0.0).all())
     PlantError.unless(rising, f"series {name}: column {column!r}", "two or more rising times", f"{len(seconds)} others")

@@ -14,6 +14,8 @@ TOLERANCE = 1e-7
 
 _MOST_STEPS = 20_000  # of CVODE's own between two readings: its default of 500 is soon used up where a unit chatters
 _MOST_ITERATIONS = 1_000  # of an event: a unit that still asks for more has none
+_MOST_EVENTS = 10_000  # between two readings: a unit that chatters more gets nowhere
+_MOST_AT_ONCE = 100  # events one after another that do not move time: a unit that has more stands still
 _SAME_TIME = 1e-6  # s
 
 Change = Callable[[], None]
@@ -136,8 +138,14 @@ class ModelExchange:
             Where it is [s].
         length : float
             How far [s].
+
+        Raises
+        ------
+        PlantError
+            When the unit asks to end, has events without end, or cannot be solved.
         """
         end, unit = time + length, self._instance
+        events, at_once, last = 0, 0, -math.inf
         while self._time < end - _SAME_TIME:
             target, event, ends = min(end, self._next), False, False
             if target > self._time + _SAME_TIME:
@@ -152,6 +160,10 @@ class ModelExchange:
                 unit.enterEventMode()
                 self._settle()
                 self._solver.reset(self._time)
+                events, at_once = events + 1, at_once + 1 if self._time <= last + _SAME_TIME else 1
+                last = self._time
+                if events > _MOST_EVENTS or at_once > _MOST_AT_ONCE:
+                    raise PlantError(f"events without end: {events} from {time:g} to {self._time:g} s")
 
     def _settle(self) -> None:
         """Iterate an event until the unit is content, and go back to continuous time."""

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from mpc.control.controller.observer import Observer
+from mpc.control.controller.ranges import READINGS
 from mpc.control.controller.site import Action, ControllerSettings, Reading, SitePoints, Source
 from mpc.control.controller.watch import FarFromModel, PossibleReadings, StuckSensors, explain_comfort
 from mpc.control.problem.assembly import DemandCount, Expected, expect
@@ -316,7 +317,7 @@ class MpcController:
         """
         self._known, self.observer.memory = _Known(**saved["known"]), saved["estimate"]
         self._stuck.memory, self._far.count, self._starts.begun = saved["stuck"], saved["far"], saved["begun"]
-        self._possible.memory = dict(saved["possible"])
+        self._possible.memory = dict(saved.get("possible", {}))
         self._demand.peaks, self._demand.windows = dict(saved["peaks"]), list(saved["windows"])
         self.solver.memory = saved["solver"]
 
@@ -325,7 +326,7 @@ def _possible(forecast: Forecast | None, reasons: list[str]) -> Forecast | None:
     """Take out of a forecast what cannot be; it counts as missing."""
     if forecast is None:
         return None
-    kept = possible_values(forecast.table)
+    kept = possible_values(forecast.table, READINGS)
     lost = forecast.table.notna() & kept.isna()
     for column in forecast.table.columns[lost.any()]:
         reasons.append(f"forecast of {column}: {int(lost[column].sum())} values that cannot be count as missing")

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
+from mpc.control.controller.ranges import READINGS
 from mpc.control.predictor.predictor import Predictor
 from mpc.control.problem.assembly import ComfortOperation
 from mpc.control.problem.channels import Channel
@@ -24,7 +25,6 @@ from thermal._types import FloatArray
 from thermal.case.points import (
     DISCHARGE_TEMPERATURE,
     OUTDOOR_TEMPERATURE,
-    POINT_TYPES,
     SUPPLY_FLOW,
     ZONE_TEMPERATURE,
     numbers,
@@ -172,7 +172,8 @@ class SitePoints:
         step = index[1] - index[0] if len(index) > 1 else length
         if not len(index) or step > length or index[-1] - index[0] + step < length:
             raise ControlError("start-up: telemetry", f"a control step, {length}, or more", f"{len(index)} rows")
-        means = possible_values(telemetry).resample(length, closed="right", label="right", origin=index[-1]).mean()
+        taken = possible_values(telemetry, READINGS)
+        means = taken.resample(length, closed="right", label="right", origin=index[-1]).mean()
         column = f"{self.weather_station}/{OUTDOOR_TEMPERATURE}"
         outdoor = means.reindex(columns=[column]).ffill().bfill().to_numpy()[:, 0]
         if np.isnan(outdoor).any():
@@ -239,7 +240,7 @@ def values_of(measurements: Mapping[str, float], entities: Sequence[str], point:
     """
     columns = [f"{entity}/{point}" if point else entity for entity in entities]
     found = numbers([measurements[c] if c in measurements else np.nan for c in columns])
-    kinds = [POINT_TYPES.get(column.rpartition("/")[2]) for column in columns]
+    kinds = [READINGS.get(column.rpartition("/")[2]) for column in columns]
     return np.array([v if k is None or k.possible(v) else np.nan for k, v in zip(kinds, found, strict=True)])
 
 

@@ -6,12 +6,13 @@ import numpy as np
 import pandas as pd
 from scipy.special import ndtr
 
+from mpc.control.controller.ranges import READINGS
 from mpc.control.problem.horizon import HorizonData
 from mpc.control.problem.problem import ControlProblem
 from mpc.control.solvers.solution import Solution
 from mpc.errors import ControlError
 from thermal._types import BoolArray, FloatArray
-from thermal.case.points import POINT_TYPES, numbers
+from thermal.case.points import numbers
 
 _RATE_SECONDS = 300.0  # s: over less time a rate says nothing, sensors lag and means jump
 _SAME = 1e-6  # K: readings that differ by less are one and the same
@@ -32,12 +33,13 @@ class PossibleReadings:
 
     Notes
     -----
-    Ranges and rates are those of the point types (`thermal.case.points.PointType`). A rate counts from the last reading
-    that was taken, over the time since; so a value that stays becomes possible again by itself.
+    Ranges and rates are those of `mpc.control.controller.ranges.READINGS`. A rate counts from the last reading
+    that was taken, over the time since; so a value that stays becomes possible again by itself. A reading that was
+    taken later than now was taken by a wrong clock: it says nothing.
     """
 
     def __init__(self, columns: Sequence[str]) -> None:
-        types = {column: POINT_TYPES.get(column.rpartition("/")[2]) for column in columns}
+        types = {column: READINGS.get(column.rpartition("/")[2]) for column in columns}
         self._types = {column: kind for column, kind in types.items() if kind is not None}
         #: Last reading that was taken of each column that has a rate, and when [unit inside the library, stamp].
         self.memory: dict[str, tuple[float, pd.Timestamp]] = {}
@@ -69,6 +71,7 @@ class PossibleReadings:
         if not kind.possible(value):
             return f"{kind.told(value)} is outside of {kind.told(kind.lowest)} to {kind.told(kind.highest)}"
         last, when = self.memory.get(column, (value, now))
+        last, when = (value, now) if now < when else (last, when)
         elapsed = max((now - when).total_seconds(), _RATE_SECONDS)
         if abs(value - last) > kind.largest_rate * elapsed / 3600.0:
             before = f"{kind.told(last)} {elapsed / 60.0:.0f} min before"

@@ -114,6 +114,7 @@ def test_saved_and_restored_it_goes_on_bit_for_bit(controller, modes, points, ma
     controller.restore_state(saved)
     again = controller.step(twin.measure(points), ahead(make_forecast, 3))
     assert dict(first) == dict(again)
+    controller.restore_state({key: value for key, value in saved.items() if key != "possible"})  # of an older version
 
 
 def test_faults_have_names_and_setpoints_stay_finite(controller, modes, points, make_forecast) -> None:

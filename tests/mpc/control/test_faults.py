@@ -129,7 +129,7 @@ OUTDOOR, WATER = "weather_station/outside_air_temperature_sensor", "BOILER/suppl
     ("name", "value", "words"),
     [
         (OUTDOOR, 0.0, "-273.15 degC is outside of -80 degC to 65 degC: it counts as missing"),
-        (WATER, 1e12, "1e+12 degC is outside of -20 degC to 180 degC: it counts as missing"),
+        (WATER, 1e12, "1e+12 degC is outside of -20 degC to 250 degC: it counts as missing"),
         (OUTDOOR, 300.0, "min before is faster than it can move: it counts as missing"),
         ("AHU/electrical_power_sensor", -1e20, "is outside of -1e+07 W to 1e+08 W: it counts as missing"),
     ],

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from mpc.control.controller.watch import FarFromModel, StuckSensors
+from mpc.control.controller.site import values_of
+from mpc.control.controller.watch import FarFromModel, PossibleReadings, StuckSensors
 from mpc.errors import ControlError
+from thermal.case.points import POINT_TYPES
 
 ZONES = ("hall", "lab", "loft")
 
@@ -67,3 +70,36 @@ def test_noise_that_does_not_show_is_not_watched() -> None:
     assert not StuckSensors(ZONES, np.full(3, 0.05), 0.0).watched.any()
     with pytest.raises(ControlError, match="probability"):
         StuckSensors(ZONES, np.full(3, 0.1), 1.0)
+
+
+def test_a_step_with_a_wrong_clock_does_not_last() -> None:
+    """What was read in the future, as a clock before it is set says, does not judge what comes after."""
+    column, stamp = "site/outside_air_temperature_sensor", pd.Timestamp("2026-01-10", tz="UTC")
+    watch, said = PossibleReadings([column]), list[str]()
+    watch.update({column: 263.15}, stamp.replace(year=2036), said)
+    summer = stamp + pd.Timedelta(days=150)
+    assert watch.update({column: 293.15}, summer, said) == {column: 293.15} and not said
+    assert watch.memory[column] == (293.15, summer)
+    assert np.isnan(watch.update({column: 250.0}, summer + pd.Timedelta(minutes=5), said)[column])
+    assert "faster than it can move" in said[0]
+
+
+@pytest.mark.parametrize(
+    ("point", "value", "never"),
+    [
+        ("zone_air_temperature_sensor", 248.15, 233.15),  # a cold store; what a failed sensor reads
+        ("supply_water_temperature_sensor", 457.15, 6553.5),
+        ("heating_power_sensor", -1.5e6, 1e9),
+        ("differential_pressure_sensor", 1.2e6, 1e7),
+        ("discharge_air_temperature_sensor", 242.0, 0.0),
+        ("wind_direction_sensor", 361.0, 999.0),
+    ],
+)
+def test_a_controller_takes_what_plants_have(point: str, value: float, never: float) -> None:
+    """Beyond the ranges by which telemetry is judged, which stay as they are."""
+    column, said = f"a/{point}", list[str]()
+    for reading, taken in ((value, True), (never, False)):
+        watch = PossibleReadings([column])
+        seen = watch.update({column: reading}, pd.Timestamp("2026-01-10", tz="UTC"), said)
+        assert np.isfinite(seen[column]) == np.isfinite(values_of({column: reading}, ["a"], point)[0]) == taken
+    assert len(said) == 1 and not POINT_TYPES[point].possible(value)

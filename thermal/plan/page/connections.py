@@ -30,6 +30,8 @@ def connection_settings() -> dict[str, Any]:
     uvicorn's own ``timeout_keep_alive`` counts from an answer only, and its ``limit_concurrency`` refuses whoever comes
     last: idle connections to a port would shut out everybody for ever. So each connection is looked at here from its
     beginning, and where there are too many, the one that waits the longest of the client that has the most is closed.
+    A client that reads nothing of its answers keeps the server waiting as well as one that sends nothing: asyncio's
+    ``close`` would wait for it, so connections are aborted. One that reads, however slowly, is left its answer.
     """
     extra("uvicorn", "pages", "server")
     from uvicorn.protocols.http.auto import AutoHTTPProtocol
@@ -39,15 +41,16 @@ def connection_settings() -> dict[str, Any]:
     class Connection(base):  # type: ignore[misc]
         def connection_made(self, transport: asyncio.Transport) -> None:
             super().connection_made(transport)
-            self.since = self.loop.time()
+            self.since, self.unsent, self.aborted = self.loop.time(), 0, False
             self.watch = self.loop.call_later(PATIENCE, self.look)
-            if len(self.connections) > MOST_CONNECTIONS:
+            if sum(not c.aborted for c in self.connections) > MOST_CONNECTIONS:
                 close_one(self.connections, self)
 
         @property
         def waiting(self) -> bool:
             """Whether the server waits for the client, rather than the client for an answer."""
-            return self.cycle is None or bool(self.cycle.response_complete) or bool(self.cycle.more_body)
+            answered = self.cycle is None or bool(self.cycle.response_complete)
+            return answered or bool(self.cycle.more_body) or bool(self.flow.write_paused)
 
         def data_received(self, data: bytes) -> None:
             super().data_received(data)
@@ -55,15 +58,21 @@ def connection_settings() -> dict[str, Any]:
                 self.since = self.loop.time()
 
         def on_response_complete(self) -> None:
-            self.since = self.loop.time()
+            self.since, self.unsent = self.loop.time(), 0  # of another answer than at the last look
             super().on_response_complete()
 
         def look(self) -> None:
-            left = PATIENCE - (self.loop.time() - self.since)
-            if self.waiting and left <= 0.0:
-                self.transport.close()
+            left, unsent = PATIENCE - (self.loop.time() - self.since), self.transport.get_write_buffer_size()
+            if 0 < self.unsent <= unsent or (not unsent and self.waiting and left <= 0.0):
+                self.abort()
             else:
-                self.watch = self.loop.call_later(left if left > 0.0 else PATIENCE, self.look)
+                self.unsent = unsent
+                self.watch = self.loop.call_later(PATIENCE if unsent or left <= 0.0 else left, self.look)
+
+        def abort(self) -> None:
+            """Close without waiting for what the client has not read."""
+            self.aborted = True
+            self.transport.abort()
 
         def connection_lost(self, exc: Exception | None) -> None:
             self.watch.cancel()
@@ -83,11 +92,10 @@ def close_one(connections: Iterable[Any], newest: Any) -> None:
     newest : connection
         The one too many.
     """
-    held = [c for c in connections if not c.transport.is_closing()]
+    held = [c for c in connections if not c.aborted]
     counts = Counter(_address(c) for c in held)
     waiting = [c for c in held if c.waiting and c is not newest]
-    chosen = min(waiting, key=lambda c: (-counts[_address(c)], c.since), default=newest)
-    chosen.transport.close()
+    min(waiting, key=lambda c: (-counts[_address(c)], c.since), default=newest).abort()
 
 
 def _address(connection: Any) -> str:

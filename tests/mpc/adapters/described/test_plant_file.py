@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+import zipfile
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +14,9 @@ import pytest
 import yaml
 
 from mpc.adapters.boptest.scenario import YearClock
-from mpc.adapters.described.load import READY, _mappings, load_plant, ready_plants
-from mpc.adapters.described.schema import PlantFile
-from mpc.adapters.described.series import NamedSeries, unit_period
+from mpc.adapters.described.load import READY, _mappings, _span, load_plant, ready_plants
+from mpc.adapters.described.schema import Period, PlantFile
+from mpc.adapters.described.series import NamedSeries, read_table, unit_period
 from mpc.adapters.fmu.plant import FmuSignals
 from mpc.errors import MpcError, PlantActionError, PlantError
 from mpc.kpi.kpis import measure_kpis
@@ -184,6 +185,7 @@ def test_ready_descriptions_fit_the_schema() -> None:
         assert all(signal.endswith("_y") for signals in described.energy.model_dump().values() for signal in signals)
 
 
+HOUSE: dict[str, Any] = {"temperature": "reaTZon_y", "floor_area": 120.0}
 EDITS: list[tuple[dict[str, Any], str]] = [
     ({"format": 2}, "plant.yaml: format: expected 1, found 2"),
     ({"zonen": {}}, "plant.yaml: zonen: expected a key of the format, found 'zonen'; the nearest valid one is 'zones'"),
@@ -194,9 +196,33 @@ EDITS: list[tuple[dict[str, Any], str]] = [
     ({"actuators": {SPEED: {"signal": "oveHeaPumY_u", "kind": "modulating"}}}, "expected a minimum of a modulating"),
     ({"actuators": {SPEED: {"signal": "oveHeaPumY_u", "kind": "stepped"}}}, f"actuators.{SPEED}.kind"),
     ({"actuators": {SPEED: "oveHeaPumX_u"}}, "'oveHeaPumX_u'; the nearest valid one is 'oveHeaPumY_u'"),
+    ({"zones": {"living": HOUSE | {"comfort": {"lower": 21, "upper": 24}}}},
+     "zones.living.comfort: expected a lower and an upper temperature in K, found 21 to 24"),
+    ({"zones": {"living": HOUSE | {"comfort": {"lower": "24 degC", "upper": {"weekday": ["21 degC"] * 24}}}}},
+     "zones.living.comfort: expected a lower and an upper temperature in K, found 297.15 to 294.15"),
+    ({"zones": {"living": HOUSE | {"comfort": {"lower": "heat", "upper": "24 degC"}}}, "series": ["heat.csv", "prices.csv", "outputs"]},
+     "zones.living.comfort.lower: expected values from -20 degC to 60 degC, found -252.15 degC of 'heat'"),
+    ({"actuators": {SETPOINT: {"signal": "oveTSet_u", "range": [16, 26]}}},
+     f"limits: {SETPOINT}: expected numbers from 253.15 to 333.15, in the library's unit, found 16 to 26"),
+    ({"actuators": {SPEED: "oveHeaPumY_u", "pump/speed": "oveHeaPumY_u"}},
+     f"actuators: pump/speed: expected an input of its own, found 'oveHeaPumY_u' of {SPEED}"),
+    ({"measurements": {"a/zone_air_temperature_sensor": {"signal": "reaTZon_y", "unit": "degC"},
+                       "b/zone_air_temperature_sensor": {"signal": "reaTZon_y", "unit": "K"}}},
+     "signal 'reaTZon_y': expected one unit, 'degC', found 'K'"),
+    ({"weather": {"outside_air_temperature_sensor": {"signal": "reaTZon_y", "unit": "degC"}}},
+     "weather.outside_air_temperature_sensor: expected values from -80 degC to 65 degC, found 292.536 degC of 'reaTZon_y'"),
     ({"prices": {"electricity": True}}, "prices.electricity: expected a number, the name of a series, or hours"),
     ({"prices": {"electricity": {"weekday": [0.1]}}}, "prices.electricity.weekday"),
     ({"prices": {"electricity": "spott"}}, "prices.electricity: expected a series of prices.csv, found 'spott'; the nea"),
+    ({"prices": {"electricity": "0.25"}}, "prices.electricity: expected a number, the name of a series, or hours"),
+    ({"prices": {"electricity": "spott"}, "series": ["prices.csv", "outputs"]},
+     "FMU house.fmu: series of prices.electricity: expected a variable, found 'spott'"),
+    ({"period": {"start": "NaT", "days": 1}}, "period.start: expected a local time"),
+    ({"period": {"start": "1500-01-01", "days": 1}}, "of the years 1"),
+    ({"period": {"start": "2023-01-11", "days": 1e9}}, "period.days: expected less than or equal to 3660"),
+    ({"control_step": 1e-6}, "control_step: expected greater than or equal to 1"),
+    ({"forecast": {"hours": 1e9}}, "forecast.hours: expected less than or equal to 8784"),
+    ({"plant": {"kind": "fmu", "file": "house.fmu", "communication_step": 1e-9}}, "communication_step: expected greater than or equal to 0.001"),
     ({"prices": None}, "prices: expected those of electricity beside the weather, found none"),
     ({"weather": {"outdoor": "spot"}}, "weather.outdoor: expected a point of the weather station, found 'outdoor'"),
     ({"period": {"start": "soon", "days": 1}}, "period.start: expected a local time such as 2023-01-09 00:00"),
@@ -215,11 +241,61 @@ EDITS: list[tuple[dict[str, Any], str]] = [
 @pytest.mark.parametrize(("changes", "says"), EDITS, ids=[says[:40] for _, says in EDITS])
 def test_descriptions_that_do_not_fit(folder: Path, changes: Mapping[str, Any], says: str) -> None:
     changed = dict(changes)
-    if changed.get("prices", {}) == {"electricity": "spott"}:
+    if changed == {"prices": {"electricity": "spott"}}:
         changed["series"] = ["prices.csv"]
-        changed["weather"] = {"outside_air_temperature_sensor": "spot"}
+        changed["weather"] = {"outside_air_temperature_sensor": {"signal": "spot", "unit": "degC"}}
+    (folder / "heat.csv").write_text("timestamp,heat\n2023-01-10,21\n2023-01-14,21\n")
     with pytest.raises(MpcError, match=re.escape(says)):
         load_plant(folder / "plant.yaml", changes=changed)
+
+
+def test_the_unit_that_a_unit_declares_holds_for_its_series(folder: Path) -> None:
+    """A setpoint that is declared in degC, by the series of the same instant in K."""
+    house = folder / "house.fmu"
+    with zipfile.ZipFile(house) as unit:
+        content = {name: unit.read(name) for name in unit.namelist()}
+    told = content["modelDescription.xml"].replace(b'<Real unit="K"/>', b'<Real unit="degC"/>')
+    assert told != content["modelDescription.xml"]
+    with zipfile.ZipFile(house, "w") as unit:
+        for name, data in (content | {"modelDescription.xml": told}).items():
+            unit.writestr(name, data)
+    # the house computes in kelvin, 20 of them here; it is its description that calls them degC
+    plant = {"kind": "fmu", "file": "house.fmu", "parameters": {"mean": 20.0}}
+    with load_plant(folder / "plant.yaml", changes={"plant": plant, "period": {"start": "2023-01-11", "days": 1}}) as made:
+        np.testing.assert_allclose(made.forecaster.scenario.outdoor, 293.15)
+
+
+HOURS = pd.date_range("2023-10-28", "2023-10-31", freq="h", tz="Europe/Brussels")
+
+
+@pytest.mark.parametrize(
+    "stamps",
+    [
+        [stamp.isoformat() for stamp in HOURS],
+        HOURS.tz_convert("UTC").strftime("%Y-%m-%dT%H:%MZ"),
+        HOURS.strftime("%Y-%m-%d %H:%M"),
+    ],
+    ids=["offsets", "UTC", "local"],
+)
+def test_tables_over_a_change_of_clocks(tmp_path: Path, stamps: Sequence[str]) -> None:
+    (tmp_path / "p.csv").write_text("\n".join(["timestamp,spot", *(f"{stamp},0.2" for stamp in stamps)]))
+    table = read_table(tmp_path / "p.csv", "p.csv", YearClock(2023, "Europe/Brussels"))
+    np.testing.assert_array_equal(table.seconds, [stamp.timestamp() for stamp in HOURS])
+
+
+@pytest.mark.parametrize(
+    ("stamps", "says"),
+    [
+        (["2023-10-29 01:00", "2023-10-29 02:00", "2023-10-29 03:00"], "write offsets or UTC"),
+        (["10.01.2023", "11.01.2023"], "series p.csv: column 'timestamp': expected times"),
+        (["2023-01-01", "", "2023-01-02"], "found nan in row 2"),
+        (["1500-01-01", "2023-01-02"], "1500-01-01"),
+    ],
+)
+def test_stamps_that_are_none(tmp_path: Path, stamps: Sequence[str], says: str) -> None:
+    (tmp_path / "p.csv").write_text("\n".join(["timestamp,spot", *(f"{stamp},0.2" for stamp in stamps)]))
+    with pytest.raises(PlantError, match=re.escape(says)):
+        read_table(tmp_path / "p.csv", "p.csv", YearClock(2023, "Europe/Brussels"))
 
 
 def test_files_that_are_none(tmp_path: Path) -> None:
@@ -231,3 +307,31 @@ def test_files_that_are_none(tmp_path: Path) -> None:
     (tmp_path / "list.yaml").write_text("- 1\n")
     with pytest.raises(PlantError, match="list.yaml: expected a mapping of keys, found list"):
         load_plant(tmp_path / "list.yaml")
+
+
+def test_a_warm_up_begins_with_the_year_at_the_earliest() -> None:
+    clock, span = _span(Period(start="2023-01-03", days=1, warm_up_days=7), "Europe/Brussels")
+    assert clock.year == 2023 and span == (2 * 86_400.0, 86_400.0, 2 * 86_400.0)
+
+
+def test_holes_of_tables_are_not_bridged(tmp_path: Path) -> None:
+    """An hourly table that lacks a day is refused where it is asked for it; its last row holds for an hour."""
+    hours = np.delete(np.arange(0.0, 240.0), np.arange(100, 124))
+    start = pd.Timestamp("2023-01-01", tz="UTC")
+    series = NamedSeries("p.csv", start.timestamp() + 3600.0 * hours, {"spot": np.ones(len(hours))})
+
+    def grid(first: float, hours: int) -> StepGrid:
+        return StepGrid(start + pd.Timedelta(hours=first), 3600.0, hours)
+
+    np.testing.assert_array_equal(series.on("spot", grid(0, 99), lines=False), 1.0)
+    np.testing.assert_array_equal(series.on("spot", grid(130, 110), lines=False), 1.0)
+    with pytest.raises(PlantError, match="rows every 3600 s, found 25 h without after 2023-01-05 03:00 UTC"):
+        series.on("spot", grid(90, 24), lines=False)
+    ends = NamedSeries("p.csv", np.append(series.seconds[:50], series.seconds[50] + 7200.0), {"spot": np.ones(51)})
+    with pytest.raises(MpcError, match="spot of p.csv"):
+        ends.on("spot", grid(50, 4), lines=False)
+    changes = NamedSeries("c.csv", start.timestamp() + 3600.0 * np.array([0, 7, 22, 31, 240]), {"spot": np.ones(5)})
+    np.testing.assert_array_equal(changes.on("spot", grid(0, 240), lines=False), 1.0)
+    (tmp_path / "p.csv").write_text("time,spot,spot\n0,1,2\n3600,1,2\n")
+    with pytest.raises(PlantError, match="a name of its own for each column, found .'spot'. again"):
+        read_table(tmp_path / "p.csv", "p.csv", YearClock(2023, "UTC"))

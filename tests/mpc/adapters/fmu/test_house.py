@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import numpy as np
 import pandas as pd
@@ -11,6 +13,7 @@ import pytest
 from scipy.linalg import expm
 
 from mpc.adapters.fmu.plant import FmuPlant, FmuSignals, FmuTime
+from mpc.adapters.fmu.stepping import ModelExchange
 from mpc.errors import PlantActionError, PlantError
 from thermal._types import FloatArray
 
@@ -163,3 +166,20 @@ def test_one_interface_only(make_house: Make) -> None:
     for kinds, interface in ((both[:1], "co-simulation"), (both[1:], "model exchange"), (both, "model exchange")):
         with FmuPlant(make_house(kinds=kinds), SIGNALS, 900.0, FmuTime(START, 3600.0)) as plant:
             assert plant.unit.interface == interface
+
+
+@pytest.mark.parametrize(("pause", "most"), [(0.0, 100), (1e-4, 500)], ids=["at once", "one after another"])
+def test_events_without_end_are_an_error(monkeypatch: pytest.MonkeyPatch, pause: float, most: int) -> None:
+    """A unit whose next event is always now, and one whose next is always soon."""
+    monkeypatch.setattr("mpc.adapters.fmu.stepping._MOST_EVENTS", 500)
+    unit = MagicMock()
+    made = SimpleNamespace(
+        modelExchange=SimpleNamespace(needsCompletedIntegratorStep=False), numberOfContinuousStates=0,
+        numberOfEventIndicators=0,
+    )  # fmt: skip
+    stepping = ModelExchange(unit, False, made, 30.0)
+    unit.newDiscreteStates.side_effect = lambda: (False, False, False, False, True, stepping._time + pause)
+    stepping._time = stepping._next = 0.0
+    stepping._solver = SimpleNamespace(reset=lambda time: None, solve=lambda time, until: (False, None, until))
+    with pytest.raises(PlantError, match=f"events without end: {most + 1} from 0 to"):
+        stepping.advance(0.0, 30.0)

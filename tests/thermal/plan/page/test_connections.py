@@ -96,9 +96,8 @@ def test_the_client_that_has_the_most_loses_one() -> None:
     closed = []
 
     def held(client: str, since: float, waiting: bool = True) -> SimpleNamespace:
-        transport = SimpleNamespace(is_closing=lambda: False)
-        made = SimpleNamespace(client=(client, 1), since=since, waiting=waiting, transport=transport)
-        transport.close = lambda: closed.append(made)
+        made = SimpleNamespace(client=(client, 1), since=since, waiting=waiting, aborted=False)
+        made.abort = lambda: closed.append(made)
         return made
 
     greedy, other = [held("b", 5.0 + k) for k in range(3)], held("a", 1.0)
@@ -107,3 +106,57 @@ def test_the_client_that_has_the_most_loses_one() -> None:
     assert closed == [greedy[0]]
     connections.close_one([busy, newest], newest)
     assert closed[1:] == [newest]
+
+
+LARGE = b"x" * 8_000_000  # more than the buffers of a socket take
+
+
+async def large(scope, receive, send) -> None:
+    """Answer at length to ``/large``."""
+    if scope["path"] != "/large":
+        return await app(scope, receive, send)
+    await send({"type": "http.response.start", "status": 200, "headers": [(b"content-length", b"%d" % len(LARGE))]})
+    await send({"type": "http.response.body", "body": LARGE})
+
+
+def asking(at: tuple[str, int], request: bytes) -> socket.socket:
+    """A connection over which something was asked for and nothing read, which takes little at once."""
+    line = socket.socket()
+    line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    line.connect(at)
+    line.sendall(request)
+    return line
+
+
+GET = b"GET /large HTTP/1.1\r\nHost: a\r\n\r\n"
+
+
+@pytest.mark.parametrize("request_", [GET, 2 * GET, GET.replace(b"a\r\n", b"a\r\nConnection: close\r\n")])
+def test_clients_that_read_nothing_shut_nobody_out(monkeypatch: pytest.MonkeyPatch, request_: bytes) -> None:
+    """However many they are, an honest client is served at once."""
+    monkeypatch.setattr(connections, "MOST_CONNECTIONS", 4)
+    with served(large) as at, contextlib.ExitStack() as held:
+        for _ in range(6):
+            held.enter_context(asking(at, request_))
+        time.sleep(0.1)
+        assert [ask(at) for _ in range(3)] == ["3"] * 3
+
+
+def test_a_client_that_reads_nothing_is_let_go(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(connections, "PATIENCE", 0.1)
+    with served(large) as at, asking(at, 2 * GET) as line:
+        time.sleep(0.4)
+        line.settimeout(5.0)
+        with contextlib.suppress(ConnectionError):
+            assert sum(iter(lambda: len(line.recv(1 << 20)), 0)) < len(LARGE)
+
+
+def test_a_client_that_reads_slowly_gets_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(connections, "PATIENCE", 0.1)
+    with served(large) as at, asking(at, GET) as line:
+        size, begin = 0, time.monotonic()
+        while size < len(LARGE):
+            size += len(found := line.recv(1 << 19))
+            assert found, "closed before its end"
+            time.sleep(0.5 * len(found) / len(LARGE))
+        assert time.monotonic() - begin > 0.4
