@@ -59,8 +59,17 @@ class KillAtFirst:
 
     def __call__(self, stage: str, done: int, total: int) -> None:
         if done and not self.killed:
-            self.killed = wait_for(lambda: begun(self.out))[-1]
-            os.kill(self.killed, signal.SIGKILL)
+            self.killed = wait_for(self._kill)
+
+    def _kill(self) -> int:
+        """Kill a worker that has begun a case, stopped first: it might finish between the look and the kill."""
+        for pid in reversed(begun(self.out)):
+            os.kill(pid, signal.SIGSTOP)
+            if pid in begun(self.out):
+                os.kill(pid, signal.SIGKILL)
+                return pid
+            os.kill(pid, signal.SIGCONT)
+        return 0
 
 
 class KillAlways(Thread):
