@@ -76,7 +76,10 @@ def schema_error(error: ValidationError, kind: type[Described], name: str, model
     """
     details = error.errors(include_url=False)
     first, more = details[0], f" (and {len(details) - 1} more in this file)" if len(details) > 1 else ""
-    place = [part for part in first["loc"] if not (isinstance(part, str) and part.startswith("<"))]
+    *outer, last = first["loc"] or ("",)
+    ends = [last] if first["type"] == "extra_forbidden" else []  # what a person wrote may look like a branch
+    inside = outer if ends else first["loc"]
+    place = [part for part in inside if not (isinstance(part, str) and part.startswith("<"))] + ends
     path = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in place).removeprefix(".")
     where, found = f"{name}: {path}" if path else name, repr(first["input"])
     if first["type"] == "extra_forbidden":

@@ -130,6 +130,13 @@ def test_unknown_keys_name_the_nearest(
         load_case(case.write())
 
 
+@pytest.mark.parametrize("path", [("<spoilt>",), ("location", "<spoilt>")])
+def test_unknown_keys_that_look_like_a_branch_of_the_schema(plan_draft: Any, path: tuple[Any, ...]) -> None:
+    set_at(plan_draft.content, path, 1.0)
+    with pytest.raises(CaseError, match="<spoilt>: expected a key of the format, found '<spoilt>'"):
+        load_case(plan_draft.write())
+
+
 NAN = float("nan")
 
 
