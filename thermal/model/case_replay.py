@@ -187,8 +187,8 @@ def _held(case: Case) -> pd.DataFrame:
     measured, day = case.zone_temperatures(), max(1, round(DELAY / case.telemetry.step))
     if measured.shape[1] == 1:  # no other zone tells anything of it
         return measured.ffill().bfill()
-    known = measured.notna().any()  # a zone that is never measured is not held
-    late = case.zone_temperatures_estimated().where(known & (measured.ffill().notna()))
+    # before its first reading a zone has the one to come, and is not held where none ever comes
+    late = case.zone_temperatures_estimated().where(measured.ffill().notna())
     return measured.ffill(limit=day).fillna(late).bfill()
 
 
