@@ -18,7 +18,7 @@ from calibration.estimation.disturbance import DisturbanceModel
 from calibration.fit.likelihood import InnovationsProblem
 from calibration.fit.problem import Problem
 from thermal._types import FloatArray
-from thermal.model.case_replay import Inputs
+from thermal.model.case_replay import SUDDEN, Inputs
 from thermal.model.matrices import SymbolicModel
 
 #: Least standard deviation of daily means before the telemetry [K].
@@ -210,7 +210,7 @@ def drawn_errors(
     entry = matrices.modal.held_response(held, step)
     parts = []
     for runs in problem.runs:
-        seen = np.isfinite(inputs.targets(runs.starts, keep))
+        seen = np.isfinite(inputs.targets(runs.starts, keep, SUDDEN))
         rows, m = runs.starts + np.arange(1, problem.steps + 1)[:, None], runs.starts.size
         first, length = int(rows.min()), int(rows.max() - rows.min()) + 1
         still = np.zeros((problem.steps, matrices.n_boundary, m))

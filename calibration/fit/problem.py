@@ -15,7 +15,7 @@ from calibration.evaluation.intervals import Interval, Runs, default_intervals, 
 from calibration.evaluation.settings import Loss, ModelSettings, calibration_settings
 from thermal._types import FloatArray
 from thermal.case.case import Case
-from thermal.model.case_replay import LEAST_SPIN_UP, Inputs, free_runs, replay_inputs, spin_up
+from thermal.model.case_replay import LEAST_SPIN_UP, SUDDEN, Inputs, free_runs, replay_inputs, spin_up
 from thermal.model.matrices import SymbolicModel
 from thermal.model.step import IMPLICIT_EULER, Scheme
 from thermal.parameters import Parameter
@@ -221,14 +221,14 @@ class Problem:
         Returns
         -------
         tuple
-            Errors (n_run, n_keep, n_zone) [K], NaN where nothing was measured, and their derivatives with respect to
-            the estimated parameters (n_run, n_keep, n_zone, n_free), or None.
+            Errors (n_run, n_keep, n_zone) [K], NaN where nothing was measured or a step changed too much to be told,
+            and their derivatives with respect to the estimated parameters (n_run, n_keep, n_zone, n_free), or None.
         """
         matrices = model.matrices(theta, slopes)
         inputs, keep = self.inputs, self.keep
         states, moved = spin_up(matrices, inputs, runs.begin, runs.starts)
         means, mean_slopes = free_runs(matrices, inputs, runs.starts, keep, states, moved, self.scheme)
-        error = means - inputs.targets(runs.starts, keep)
+        error = means - inputs.targets(runs.starts, keep, SUDDEN)
         return error, None if mean_slopes is None else mean_slopes[..., list(self.free)]
 
     def spread(self, error: FloatArray) -> float:

@@ -4,13 +4,13 @@ A drawing has one value for the masses of all zones, and zones differ in them. W
 that is wrong zone by zone, and gains as much as a true one.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from calibration.diagnosis.decide.verdict import judge
-from calibration.diagnosis.refit.comparison import Fit, ModelComparison
+from calibration.diagnosis.refit.comparison import Effects, Fit, ModelComparison
 from calibration.diagnosis.refit.refit import ACCEPTED, held_out
 from calibration.diagnosis.refit.search import Round, search
 from calibration.errors import CalibrationError
@@ -32,8 +32,9 @@ def challenge(
 ) -> tuple[ModelComparison, tuple[Round, ...]]:
     """Search anew about a building with masses by zone, where these are better evidence than what was found.
 
-    They are weighed against all that was found, or against that part of it which acts as masses do; and where something
-    is left that no effect explains, against nothing.
+    They are weighed against what was found, alone and beside as much of it as does not act as masses do: what zones
+    differ in takes further effects to imitate, and hides what is missing. Where something is left that no effect
+    explains, they are weighed against nothing.
 
     Parameters
     ----------
@@ -60,27 +61,36 @@ def challenge(
     settings = replace(models.settings, scopes={**models.settings.scopes, **scopes})
     zoned = ModelComparison(models.case, settings, models.tuned, models.judged, models.horizon)
     known = dict(rounds[0].before.effects)
-    kept = {e: z for e, z in final.effects.items() if e not in _LIKE_MASSES or e in known}
-    kept = known if len(kept) == len(final.effects) else kept
-    # a name has to beat what needs none as clearly as it beat nothing; what needs none has to beat nothing so too
-    margin = ACCEPTED + _price(rounds) if final.effects.keys() - known else -ACCEPTED
     try:
-        other = zoned.fit(kept, [_values(final, kept)])
-        if other.evidence < final.evidence - margin:
-            return models, tuple(rounds)
-        baseline = other if kept == known else zoned.fit(known, [_values(final, known)])
+        for effects, least in _rivals(rounds, known):
+            if zoned.fit(effects, [_values(final, effects)]).evidence >= least:
+                baseline = zoned.fit(known, [_values(final, known)])
+                return zoned, search(zoned, baseline, held_out(zoned, baseline), candidates, progress)
     except (ArithmeticError, np.linalg.LinAlgError, CalibrationError, ModelError):
-        return models, tuple(rounds)
-    return zoned, search(zoned, baseline, held_out(zoned, baseline), candidates, progress)
+        pass
+    return models, tuple(rounds)
 
 
-def _price(rounds: Sequence[Round]) -> float:
-    """Evidence that the choice of zones has cost what was accepted [-]."""
-    accepted = [(r, r.accepted.gain) for r in rounds if r.accepted is not None]
-    return sum(r.after.evidence - r.before.evidence - gain for r, gain in accepted)
+def _rivals(rounds: Sequence[Round], known: Effects) -> Iterator[tuple[Effects, float]]:
+    """Parts of what was found, from nothing on, and the evidence that masses by zone must have beside each.
+
+    A name has to beat what needs none as clearly as it beat nothing; masses that need as many have to beat these so.
+    """
+    accepted = [(r, r.accepted) for r in rounds if r.accepted is not None]
+    final, seen = rounds[-1].after, set()
+    for dropped in range(len(accepted), -1, -1):
+        before = final if not dropped else accepted[-dropped][0].before
+        kept = {e: z for e, z in before.effects.items() if e in final.effects and (e in known or e not in _LIKE_MASSES)}
+        if (names := frozenset(kept)) in seen:
+            continue
+        seen.add(names)
+        left = [(r, a) for r, a in accepted if a.screened.effect not in kept]
+        # evidence that the choice of zones has cost what is left
+        price = sum(r.after.evidence - r.before.evidence - a.gain for r, a in left)
+        yield kept, final.evidence - (ACCEPTED + price if left else -ACCEPTED)
 
 
-def _values(fit: Fit, effects: dict[str, tuple[str, ...]]) -> dict[str, float]:
+def _values(fit: Fit, effects: Effects) -> dict[str, float]:
     """Parameters of a fit, its common ones for each zone, those of other effects left out [parameter units]."""
     parameters = fit.built.network.parameters
     return {p.name: fit.values[p.name] for p in parameters if p.effect is None or p.effect in effects}
