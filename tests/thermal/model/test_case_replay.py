@@ -29,6 +29,7 @@ from thermal import (
 )
 from thermal.case.building import Airflow, Layer, Location, Surface, ZoneEntry
 from thermal.errors import ModelError
+from thermal.model.case_replay import SUDDEN
 from thermal.model.step import IMPLICIT_EULER, SCHEMES, Stepper
 
 FloatArray = NDArray[np.float64]
@@ -365,3 +366,15 @@ def test_telemetry_without_a_complete_step_names_what_is_missing() -> None:
     flows = {c: (0, 576) for c in load_bundled_case().telemetry.frame if c.endswith("supply_air_flowrate_sensor")}
     with pytest.raises(ModelError, match="F1_W"):
         replay_inputs(case_with(flows), bundled_network().network)
+
+
+def test_what_changes_too_fast_to_be_told_is_left_out_where_it_is_asked_for() -> None:
+    inputs = inputs_of("plan")
+    zone = inputs.zone.copy()
+    zone[200:, 0] += 4.0  # a setpoint jumps, and ideal air follows within the step
+    zone[300:, 1] += 0.5 * SUDDEN * inputs.step
+    jumped = replace(inputs, zone=zone)
+    starts, keep = np.array([195, 295]), np.array([4, 5, 6])
+    assert np.isfinite(jumped.targets(starts, keep)).all()
+    seen = np.isfinite(jumped.targets(starts, keep, SUDDEN))
+    assert not seen[0, 1, 0] and seen.sum() == seen.size - 1

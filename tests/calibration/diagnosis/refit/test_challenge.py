@@ -40,7 +40,11 @@ def accepted(models: ModelComparison) -> list[Any]:
     before, zones = models.fit({}, [{}]), models.case.building.zone_names
     after = models.fit({"flow_gain": zones}, [before.values])
     gain = after.evidence - before.evidence - choice_of(len(zones), len(zones))
-    return [SimpleNamespace(before=before, after=after, accepted=SimpleNamespace(gain=gain))]
+    return [SimpleNamespace(before=before, after=after, accepted=named("flow_gain", gain))]
+
+
+def named(effect: str, gain: float) -> SimpleNamespace:
+    return SimpleNamespace(screened=SimpleNamespace(effect=effect), gain=gain)
 
 
 @pytest.fixture
@@ -81,8 +85,24 @@ def test_where_nothing_is_missing_or_masses_are_what_is_nothing_is_challenged(
 ) -> None:
     models = ModelComparison(office(by_zone=True), ModelSettings(dx=1.0))
     rounds = accepted(models)
-    named = SimpleNamespace(**vars(rounds[0]) | {"after": SimpleNamespace(effects={"hidden_mass": ()})})
-    assert challenge(models, [named], [])[1] == (named,)
+    masses = SimpleNamespace(**vars(rounds[0]) | {"after": SimpleNamespace(effects={"hidden_mass": ()})})
+    assert challenge(models, [masses], [])[1] == (masses,)
     monkeypatch.setattr(module, "judge", lambda *_: SimpleNamespace(name="no_gap"))
     assert challenge(models, rounds, [])[1] == tuple(rounds)
     assert told == []
+
+
+def test_masses_are_weighed_alone_and_beside_each_part_of_what_was_found() -> None:
+    chain = [({}, 100.0), ({"ground_exchange": ()}, 120.0), ({"ground_exchange": (), "flow_gain": ("a",)}, 135.0)]
+    fits = [SimpleNamespace(effects=effects, evidence=evidence) for effects, evidence in chain]
+    rounds: list[Any] = [
+        SimpleNamespace(before=fits[0], after=fits[1], accepted=named("ground_exchange", 20.0)),
+        SimpleNamespace(before=fits[1], after=fits[2], accepted=named("flow_gain", 12.0)),  # its zone costs 3
+        SimpleNamespace(before=fits[2], after=fits[2], accepted=None),
+    ]
+    alone, beside = module._rivals(rounds, {})
+    assert alone == ({}, 135.0 - 6.0 - 3.0)
+    assert beside == ({"ground_exchange": ()}, 135.0 - 6.0 - 3.0)
+    assert list(module._rivals(rounds[:1], {})) == [({}, 120.0 - 6.0), ({"ground_exchange": ()}, 120.0 + 6.0)]
+    nothing: Any = SimpleNamespace(before=fits[0], after=fits[0], accepted=None)
+    assert list(module._rivals([nothing], {})) == [({}, 100.0 + 6.0)]
