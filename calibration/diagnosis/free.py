@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calibration.diagnosis.decide.name import VerdictName
 from calibration.diagnosis.decide.verdict import Verdict
 from calibration.diagnosis.known import reasons_of
 from calibration.diagnosis.refit.comparison import Effects, ModelComparison
@@ -120,10 +121,9 @@ def with_recurring(verdict: Verdict, free: Free, rungs: Sequence[Rung]) -> Verdi
     rest = [c for c in verdict.candidates if c is not own and c not in ahead]
     chain = {e: (1.0 - _SURE) * p for e, p in verdict.combinations.items()}
     chain |= {(*e, GAINS): _SURE * p for e, p in verdict.combinations.items()}
-    return Verdict(
-        "named" if verdict.name == "no_gap" else verdict.name, (*ahead, told, *rest),
-        tuple(dict.fromkeys((*verdict.set90, GAINS))), chain,
-    )  # fmt: skip
+    name: VerdictName = "named" if verdict.name == "no_gap" else verdict.name
+    set90 = tuple(dict.fromkeys((*verdict.set90, GAINS)))
+    return replace(verdict, name=name, candidates=(*ahead, told, *rest), set90=set90, combinations=chain)
 
 
 def is_recurring(verdict: Verdict) -> bool:

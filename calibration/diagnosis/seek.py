@@ -129,6 +129,7 @@ def answer_entries(
     return {
         "which": [c.to_dict() | {"repeats": plain(halves.get(c.effect))} for c in verdict.candidates],
         "set90": verdict.set90,
+        "summary": None if verdict.summary is None else verdict.summary.to_dict(),
         "combinations": [{"effects": list(e), "probability": p} for e, p in verdict.combinations.items()],
         "how_far": [*(f.how_far(floor) for f in faults), *(s.to_dict() for s in steps)],
         "rounds": [r.to_dict() | {"worth": gains_of(r)} for r in rounds],

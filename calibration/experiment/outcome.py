@@ -8,7 +8,8 @@ import numpy as np
 import pandas as pd
 
 from calibration.diagnosis.decide.levels import TEMPERATURE
-from calibration.diagnosis.decide.verdict import Candidate, Verdict, VerdictName
+from calibration.diagnosis.decide.name import VerdictName
+from calibration.diagnosis.decide.verdict import Candidate, Verdict
 from calibration.diagnosis.diagnosis import Diagnosis, diagnose
 from calibration.errors import CalibrationError
 from calibration.evaluation.intervals import Interval

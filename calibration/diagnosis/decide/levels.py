@@ -1,16 +1,39 @@
 """Levels of the verdict, beside those that each case's own nulls give; see `benchmarks/blind_trials.py`."""
 
-#: Gain of generic heat above which a gap is there though no effect of the catalogue explains it [-].
-GENERIC_GAP = 8.0
+from dataclasses import dataclass
 
-#: Root mean square of the tuning errors of the last model above which something is left unexplained [K], and its share
-#: of that by which zone temperatures change over the horizon, for a model is as wrong as it is driven hard [-]: the
-#: larger counts. Where one zone has over so many times its share of the squared error, the smaller one does [K, -].
-LEFT_OVER, LEFT_OF_CHANGE, LEFT_IN_A_ZONE, CONCENTRATED = 0.2, 0.11, 0.1, 3.5
 
-#: Least share of the squared error that accepted effects must explain for a cause to be named, and where much is left
-#: over [-].
-EXPLAINED, EXPLAINED_OF_MUCH = 0.4, 0.6
+@dataclass(frozen=True)
+class Levels:
+    """From where on an answer has another name. ``blind_trials.py worlds`` chooses them anew without each world.
+
+    Parameters
+    ----------
+    left_over : float
+        Root mean square of the tuning errors of the last model above which something is left unexplained [K].
+    left_of_change : float
+        Its share of that by which zone temperatures change over the horizon, for a model is as wrong as it is driven
+        hard [-]: the larger of the two counts.
+    left_in_a_zone, concentrated : float
+        What counts where one zone has over so many times its share of the squared error [K, -].
+    explained, explained_of_much : float
+        Least share of the squared error that accepted effects must explain for a cause to be named, and where much is
+        left over [-].
+    generic : float
+        Gain of heat of any shape above which a gap is there though no effect of the catalogue explains it [-].
+    """
+
+    left_over: float = 0.2
+    left_of_change: float = 0.11
+    left_in_a_zone: float = 0.1
+    concentrated: float = 3.5
+    explained: float = 0.4
+    explained_of_much: float = 0.6
+    generic: float = 8.0
+
+
+#: Those that hold.
+LEVELS = Levels()
 
 #: Difference of gains within which effects of a round cannot be told apart [-].
 APART = 3.0

@@ -2,11 +2,12 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from calibration.diagnosis.decide import levels
+from calibration.diagnosis.decide.name import Summary, VerdictName
 from calibration.diagnosis.refit.comparison import Fit
 from calibration.diagnosis.refit.refit import Refit, promising
 from calibration.diagnosis.refit.search import Round, accepted_from
@@ -16,8 +17,6 @@ from thermal.effects.catalogue import CATALOGUE
 
 #: Standard deviations from the estimate to an end of a 90 % interval [-].
 _NINETY = 1.645
-
-VerdictName = Literal["no_gap", "named", "group", "unexplained"]
 
 
 class Estimate(NamedTuple):
@@ -99,12 +98,15 @@ class Verdict:
         Effects that hold all present ones with 90 % probability; empty when the answer may be none.
     combinations : mapping of tuple of str to float
         Probability that the effects up to a round are all there are, in the order of the rounds; sums to 1 [-].
+    summary : Summary, optional
+        What the name follows from, but for faults of the telemetry and gains that recur.
     """
 
     name: VerdictName
     candidates: tuple[Candidate, ...]
     set90: tuple[str, ...]
     combinations: Mapping[tuple[str, ...], float]
+    summary: Summary | None = None
 
 
 def judge(rounds: Sequence[Round], untestable: Mapping[str, str], left_over: Regular | None = None) -> Verdict:
@@ -138,9 +140,10 @@ def judge(rounds: Sequence[Round], untestable: Mapping[str, str], left_over: Reg
             chain.append((tuple(r.before.effects), real * none))
             real *= 1.0 - none
     chain.append((tuple(rounds[-1].after.effects), real))
-    name = _name(rounds, left_over)
+    summary = summarised(rounds, left_over)
+    name = summary.name()
     if name == "unexplained" and chain[1:]:  # what explains a part only is there with no more than that probability
-        share = float(np.clip(_explained(rounds, left_over), 0.0, 1.0))
+        share = float(np.clip(summary.explained(), 0.0, 1.0))
         probability = {e: share * p for e, p in probability.items()}
     first = [r.accepted.screened.effect for r in rounds if r.accepted is not None and name in ("named", "group")]
     candidates = sorted(
@@ -151,7 +154,7 @@ def judge(rounds: Sequence[Round], untestable: Mapping[str, str], left_over: Reg
         ),
     )  # fmt: skip
     set90 = _inside(rounds, candidates) if name in ("named", "group") else ()
-    return Verdict(name, tuple(candidates), set90, dict(chain))
+    return Verdict(name, tuple(candidates), set90, dict(chain), summary)
 
 
 def doubted(verdict: Verdict, effects: Collection[str]) -> Verdict:
@@ -206,17 +209,27 @@ def group_of(r: Round, effect: str) -> tuple[str, ...]:
     return tuple(alike)
 
 
-def _name(rounds: Sequence[Round], left_over: Regular | None) -> VerdictName:
-    first = rounds[0]
-    much = _left_over(rounds[-1].after) if left_over is None else left_over.counts
-    enough = levels.EXPLAINED_OF_MUCH if much else levels.EXPLAINED
-    if first.accepted is not None and _explained(rounds, left_over) >= enough:
-        size = len(group_of(first, first.accepted.screened.effect))
-        if size <= levels.LARGEST_GROUP:
-            return "named" if size == 1 else "group"
-        return "unexplained"
-    shows = left_over is None and first.generic.gain > generic_from(first)
-    return "unexplained" if first.accepted is not None or shows or much else "no_gap"
+def summarised(rounds: Sequence[Round], left_over: Regular | None = None) -> Summary:
+    """What the name of a verdict follows from.
+
+    Parameters
+    ----------
+    rounds, left_over
+        As in `judge`.
+    """
+    first, last, fit = rounds[0], rounds[-1], rounds[-1].after
+    before, after = first.before.found.mean_square, fit.found.mean_square
+    back = found = None
+    if left_over is not None:
+        back = left_over.counts
+        found = (before - after) / max(before - after + left_over.explains * back, 1e-12)
+    group = () if first.accepted is None else group_of(first, first.accepted.screened.effect)
+    zones = fit.by_zone[fit.by_zone > 0.0]
+    return Summary(
+        first.accepted is not None, len(group), 1.0 - after / before,
+        1.0 - (last.after_held_out.mae / first.held_out.mae) ** 2, float(np.sqrt(after)), fit.change,
+        float(zones.max() / zones.mean()), first.generic.gain, first.own.generic_level, back, found,
+    )  # fmt: skip
 
 
 def generic_from(r: Round) -> float:
@@ -227,30 +240,7 @@ def generic_from(r: Round) -> float:
     r : Round
         Of the search.
     """
-    return max(levels.GENERIC_GAP, r.own.generic_level)
-
-
-def _explained(rounds: Sequence[Round], left_over: Regular | None) -> float:
-    """Share of the squared error that is explained: where it was fitted, or held out unless much is left over.
-
-    Where it is known what comes back of the rest, the share of that and of what was explained.
-    """
-    first, last = rounds[0], rounds[-1]
-    before, after = first.before.found.mean_square, last.after.found.mean_square
-    if left_over is not None:
-        return (before - after) / max(before - after + left_over.explains * left_over.counts, 1e-12)
-    tuning = after / before
-    held_out = (last.after_held_out.mae / first.held_out.mae) ** 2
-    return 1.0 - (tuning if _left_over(last.after) else min(tuning, held_out))
-
-
-def _left_over(fit: Fit) -> bool:
-    """Whether the errors of a model are larger than what cases without a missing effect keep."""
-    zones = fit.by_zone[fit.by_zone > 0.0]
-    size = float(np.sqrt(fit.found.mean_square))
-    return size > max(levels.LEFT_OVER, levels.LEFT_OF_CHANGE * fit.change) or (
-        size > levels.LEFT_IN_A_ZONE and float(zones.max() / zones.mean()) > levels.CONCENTRATED
-    )
+    return max(levels.LEVELS.generic, r.own.generic_level)
 
 
 def _source(r: Round, effect: str) -> Gain | Refit:

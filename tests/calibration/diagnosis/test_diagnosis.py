@@ -9,8 +9,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from calibration.diagnosis.decide.levels import CONCENTRATED, LEFT_OF_CHANGE, LEFT_OVER
-from calibration.diagnosis.decide.verdict import _left_over, judge
+from calibration.diagnosis.decide.levels import Levels
+from calibration.diagnosis.decide.verdict import judge, summarised
 from calibration.diagnosis.diagnosis import Diagnosis, baseline_gap, diagnose
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.diagnosis.refit.how_far import _permutation_test
@@ -245,22 +245,20 @@ def test_telemetry_is_shifted_only_by_more_than_one_of_its_steps() -> None:
 
 
 def test_what_may_be_left_over_grows_with_how_far_temperatures_change() -> None:
-    fit = diagnosed(None).final
+    result = diagnosed(None)
+    fit, told = result.final, summarised(result.rounds)
     zone = fit.built.inputs.zone
     changes = zone[fit.problem.steps :] - zone[: -fit.problem.steps]
-    assert fit.change == pytest.approx(np.sqrt(np.nanmean(changes**2)))
-    by_zone = fit.by_zone / fit.by_zone.mean()
+    assert told.change == fit.change == pytest.approx(np.sqrt(np.nanmean(changes**2)))
+    assert told.left == pytest.approx(np.sqrt(fit.found.mean_square))
+    assert 1.0 <= told.peak == pytest.approx(fit.by_zone.max() / fit.by_zone.mean())
 
     def left(rms: float, driven: float) -> bool:
-        built = replace(fit.built, inputs=replace(fit.built.inputs, zone=driven * zone))
-        as_large = replace(fit, built=built, found=replace(fit.found, mean_square=rms**2))
-        as_large.__dict__["by_zone"] = rms**2 * by_zone
-        return _left_over(as_large)
+        return replace(told, left=rms, change=driven, peak=1.0).much(Levels(left_over=0.2, left_of_change=0.1))
 
-    share = LEFT_OF_CHANGE * fit.change / LEFT_OVER  # of the border, as the twin is driven
-    assert by_zone.max() < CONCENTRATED
-    assert (left(0.99 * LEFT_OVER, 0.5 / share), left(1.01 * LEFT_OVER, 0.5 / share)) == (False, True)
-    assert (left(1.98 * LEFT_OVER, 2.0 / share), left(2.02 * LEFT_OVER, 2.0 / share)) == (False, True)
+    assert (left(0.198, 1.0), left(0.202, 1.0)) == (False, True)
+    assert (left(0.398, 4.0), left(0.402, 4.0)) == (False, True)
+    assert replace(told, left=0.15, change=1.0, peak=4.0).much(Levels(left_in_a_zone=0.1, concentrated=3.5))
 
 
 def test_tangents_promise_what_a_fit_keeps() -> None:
