@@ -14,8 +14,10 @@ class Levels:
     left_of_change : float
         Its share of that by which zone temperatures change over the horizon, for a model is as wrong as it is driven
         hard [-]: the larger of the two counts.
-    left_in_a_zone, concentrated : float
-        What counts where one zone has over so many times its share of the squared error [K, -].
+    left_in_a_zone : float
+        What counts instead where one zone has most of the squared error [K].
+    concentrated : float
+        Squared error of a zone over the mean of all from which it has [-].
     explained, explained_of_much : float
         Least share of the squared error that accepted effects must explain for a cause to be named, and where much is
         left over [-].

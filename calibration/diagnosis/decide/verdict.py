@@ -8,7 +8,6 @@ import numpy as np
 
 from calibration.diagnosis.decide import levels
 from calibration.diagnosis.decide.name import Summary, VerdictName
-from calibration.diagnosis.refit.comparison import Fit
 from calibration.diagnosis.refit.refit import Refit, promising
 from calibration.diagnosis.refit.search import Round, accepted_from
 from calibration.diagnosis.screen.gains import Gain
