@@ -209,7 +209,7 @@ def group_of(r: Round, effect: str) -> tuple[str, ...]:
 
 
 def summarised(rounds: Sequence[Round], left_over: Regular | None = None) -> Summary:
-    """What the name of a verdict follows from.
+    """Summarise what the name of a verdict follows from.
 
     Parameters
     ----------
