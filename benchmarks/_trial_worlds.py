@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from _leave_one_out import Fold, leave_one_out
 from _table import markdown, publish, write
-from _trial_answers import read_trials
+from _trial_answers import SEALED, read_trials
 from _trial_scores import Rate, Trial, gap_of, score
+from spoilt_buildings import read as read_spoilt
 
 NAME = "blind_trials_worlds"
 
@@ -21,6 +24,7 @@ _COLUMNS = {
     "abstained": "abstained",
     "wrong names of all": "wrong name, of all trials",
     "90 % sets cover": "90 % set covers",
+    "outside unexplained": "outside called unexplained",
 }
 
 
@@ -90,7 +94,7 @@ def report_worlds(outs: Sequence[Path], published: bool) -> str:
     published : bool
         Also replace the table between its marks.
     """
-    trials = [t for out in outs for t in read_trials(out)]
+    trials = [t for out in outs for t in _read(out)]
     if not trials:
         raise SystemExit(f"{', '.join(map(str, outs))}: expected answered trials, found none; run `diagnose` first")
     scored = by_world(trials)
@@ -101,12 +105,34 @@ def report_worlds(outs: Sequence[Path], published: bool) -> str:
             "over 0.05 K are not counted.")  # fmt: skip
     table = markdown(("world", *_COLUMNS), [[name, *_cells(rates["rates"])] for name, rates in scored.items()])
     columns = ("world", "building", "trial", "holds", "gap [K]", "verdict", "first", "what is wrong")
-    page = f"{head}\n\n{table}\nEach failure:\n\n{markdown(columns, failures(trials))}"
+    folds = leave_one_out(trials)
+    page = f"{head}\n\n{table}\n{_folds(folds)}Each failure:\n\n{markdown(columns, failures(trials))}"
     plain = {w: {**s, "rates": {name: r.to_dict() for name, r in s["rates"].items()}} for w, s in scored.items()}
+    plain |= {f"without {f.world}": {"levels": f.moved, "rates": {n: r.to_dict() for n, r in f.chosen["rates"].items()}}
+              for f in folds}  # fmt: skip
     write(outs[0], NAME, page, plain, published=False)
     if published:
         publish(NAME, page)
     return page
+
+
+def _read(out: Path) -> list[Trial]:
+    """Open the seals of a folder of either kind: of made buildings, or of measured ones whose telemetry was spoilt."""
+    first = next(iter(sorted((out / SEALED).glob("*.json"))), None)
+    if first is not None and "source" in json.loads(first.read_text(encoding="utf-8")):
+        return [trial for _, trial in read_spoilt(out).values()]
+    return read_trials(out)
+
+
+def _folds(folds: Sequence[Fold]) -> str:
+    """Lay out what levels chosen on the other worlds make of each."""
+    if not folds:
+        return ""
+    rows = [
+        [f.world, ", ".join(f"{k} {v:g}" for k, v in f.moved.items()) or "as shipped", *_cells(f.chosen["rates"])]
+        for f in folds
+    ]
+    return f"By levels that the other worlds choose:\n\n{markdown(('world', 'levels', *_COLUMNS), rows)}\n"
 
 
 def _cells(rates: Mapping[str, Rate]) -> list[str]:

@@ -18,7 +18,7 @@ Run from the repository's root, in an environment with Python 3.11 or newer::
     python benchmarks/blind_trials.py diagnose --out results/blind
     python benchmarks/blind_trials.py score --out results/blind
     python benchmarks/blind_trials.py make --world reference --out results/reference --kind all --seeds 0-9
-    python benchmarks/blind_trials.py worlds --out results/blind results/reference    # one table of several worlds
+    python benchmarks/blind_trials.py worlds --out results/blind results/reference results/spoilt   # by world
 
 `diagnose` answers each trial in a process of its own, which gets the case folder and nothing else; `score` opens the
 seals of what is answered. Pairs less one effect are needed for their gap only, which `gaps` measures in a tenth of the
@@ -36,27 +36,10 @@ from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from pathlib import Path
 
+from _seeds import seed_range
 from _trial_answers import CASES, SEALED, answer_all, measure_gaps, report
 from _trial_worlds import report_worlds
 from _worlds import PACKAGES, Drawn, World, world
-
-
-def seed_range(text: str) -> range:
-    """Read `A-B`, both included, or one seed.
-
-    Parameters
-    ----------
-    text : str
-        Of the command line.
-    """
-    first, _, last = text.partition("-")
-    try:
-        found = range(int(first), int(last or first) + 1)
-    except ValueError:
-        found = range(0)
-    if not found:
-        raise argparse.ArgumentTypeError(f"expected seeds such as 0-19, found {text!r}")
-    return found
 
 
 def make(maker: World, specs: Sequence[Drawn], out: Path, workers: int) -> list[str]:

@@ -29,9 +29,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from _seeds import seed_range
 from _table import markdown, publish, write
 from _trial_scores import LEAST_GAP
-from blind_trials import seed_range
 from energyplus_trials.climate import YEAR
 from energyplus_trials.drawing import draw_spec
 from energyplus_trials.errors import TrialError

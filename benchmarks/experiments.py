@@ -26,9 +26,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from _experiment_sites import DX, STRENGTHS, Site, draw_site
+from _seeds import seed_range
 from _table import markdown, publish, write
 from _trial_scores import Rate
-from blind_trials import seed_range
 
 from calibration.diagnosis.decide.verdict import Verdict, judge
 from calibration.diagnosis.refit.comparison import ModelComparison

@@ -33,8 +33,8 @@ from typing import Any
 import numpy as np
 from _code import code
 from _monitored_years import DAYS, evidence_of_oracle, make_year
+from _seeds import seed_range
 from _table import markdown, publish, write
-from blind_trials import seed_range
 
 from calibration.monitoring.course import THRESHOLD
 from calibration.monitoring.monitor import REFERENCE_DAYS, monitor

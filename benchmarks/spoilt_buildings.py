@@ -31,10 +31,10 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from _seeds import seed_range
 from _table import markdown, publish, write
 from _trial_answers import ANSWERS, CASES, SEALED, answer_all
 from _trial_scores import Trial, gap_of, score
-from blind_trials import seed_range
 
 from thermal import load_case
 from thermal.case.building import OUTDOOR, Building, ZoneTable
@@ -218,6 +218,7 @@ def read(out: Path) -> dict[str, tuple[dict[str, Any], Trial]]:
         found[name] = label, Trial(
             name, "null" if null else "single", () if null else (frozenset(right),), () if null else (label["kind"],),
             1.0, frozenset(label["zones"]), unexplained, () if null else (twin,), answer, True, label["numbers"],
+            "measured", label["source"],
         )  # fmt: skip
     return found
 

@@ -14,7 +14,7 @@ import pytest
 @pytest.fixture(scope="module")
 def worlds(script: Callable[[str], ModuleType], package: Callable[[str], ModuleType]) -> ModuleType:
     package("energyplus_trials.drawing")
-    for name in ("_table", "_code", "_trial_scores", "_trial_answers"):
+    for name in ("_table", "_code", "_seeds", "_trial_scores", "_trial_answers", "_leave_one_out", "spoilt_buildings"):
         script(name)
     return script("_trial_worlds")
 
@@ -64,3 +64,29 @@ def test_worlds_are_scored_apart_and_each_failure_is_told(worlds, tmp_path):
 def test_a_folder_without_answers_is_told(worlds, tmp_path):
     with pytest.raises(SystemExit, match="expected answered trials, found none"):
         worlds.report_worlds([tmp_path], published=False)
+
+
+def test_levels_are_chosen_on_the_other_worlds_and_faults_keep_their_names(worlds):
+    """Of two worlds one leaves 0.25 K in nulls, where nothing is missing, and the other 0.1 K."""
+    from _leave_one_out import choose, judged, leave_one_out
+    from _trial_scores import Trial
+
+    from calibration.diagnosis.decide.levels import LEVELS
+    from calibration.diagnosis.decide.name import Summary
+
+    def trial(world: str, left: float, verdict: str | None = None) -> Trial:
+        told = Summary(False, 0, 0.0, 0.0, left, 1.0, 1.0, 0.0, 0.0)
+        which = [{"effect": "solar_gain", "probability": 0.0, "group": ["solar_gain"], "zones": [], "testable": True}]
+        answer = {"verdict": verdict or told.name(), "summary": told.to_dict(), "which": which, "set90": [],
+                  "gap": {"mae": left}, "how_far": [], "seconds": 1.0}  # fmt: skip
+        return Trial(f"{world} {left}", "null", (), (), 0.0, frozenset(), False, (), answer, world=world)
+
+    loud = [trial("loud", left) for left in (0.23, 0.25, 0.26)]
+    quiet = [trial("quiet", 0.1)]
+    folds = {f.world: f for f in leave_one_out([*loud, *quiet])}
+    assert folds["loud"].levels == LEVELS and folds["loud"].chosen["rates"]["nulls unexplained"].hits == 3
+    assert folds["quiet"].levels.left_over > 0.26 and set(folds["quiet"].moved) == {"left_over"}
+    assert judged(loud[0], folds["quiet"].levels).answer["verdict"] == "no_gap"
+    named = trial("loud", 0.3, verdict="named")  # by a fault of the telemetry
+    assert judged(named, choose([loud])).answer["verdict"] == "named"
+    assert leave_one_out(loud) == []
