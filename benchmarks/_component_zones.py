@@ -7,6 +7,7 @@ thermostat lets each run; what follows is compared.
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -22,7 +23,9 @@ from _component_models import (
     run,
 )
 
-from thermal.components.component import Calls, Conditions, Given
+from _hvac_offices import bypass_factor
+
+from thermal.components.component import Calls, Conditions, Given, Group
 from thermal.components.curves import (
     DX_CAPACITY,
     DX_HEATING_CAPACITY,
@@ -31,11 +34,12 @@ from thermal.components.curves import (
 )
 from thermal.components.electric_heaters import ElectricHeaters
 from thermal.components.machine_map import Defrost, MachineMap
-from thermal.components.moist_air import WATER_HEAT_CAPACITY
-from thermal.components.operations import NumpyOperations
+from thermal.components.moist_air import WATER_HEAT_CAPACITY, wet_bulb
+from thermal.components.operations import FloatOperations, NumpyOperations
 from thermal.components.radiators import Radiators
 from thermal.components.streams import HotWater, SupplyWater
 from thermal.components.ventilators import Ventilators
+from thermal.components.water_coil import WaterCoil
 from thermal.components.zone_units import FanCoils, UnitaryUnits
 
 FREEZING, SITE_PRESSURE, DENSITY = 273.15, 99_060.0, 1.18  # K, Pa, kg/m3 of air at the site
@@ -43,8 +47,9 @@ ZONES = ("electric", "radiator", "fan coil", "unitary", "ventilator")
 HEAT, COLD, AIR, FAN = 7000.0, 6000.0, 0.42, 140.0  # W, W, kg/s, W of the units
 HOT, CHILLED = 60.0, 7.0  # degC
 FLOW = 4e-4  # m3/s of hot or chilled water, the valve open
-BYPASS, DX_COP, HEATING_COP, LOSS = 0.06, 3.8, 3.36, 0.15
+DX_COP, HEATING_COP, LOSS, SENSIBLE = 3.8, 3.36, 0.15, 0.75
 RESISTANCE, EFFECTIVENESS, AIR_RATE = 4000.0, 0.75, 0.06  # W, -, kg/s
+COIL_IN, COIL_OUT, COIL_BYPASS = (25.5, 0.010), (13.5, 0.0088), 0.143  # the dew point of the line between is 11.5 degC
 ONE = np.zeros(1, dtype=int)
 DEFROST = Defrost(278.15, input_share=1.0, pressure=SITE_PRESSURE)
 
@@ -149,11 +154,12 @@ def _heater_model() -> str:
         idf(electric, "the heater", "always", "HeatingDesignCapacity", HEAT, None, None, 1.0),
         _served("radiator", (water, "the radiator")),
         idf(f"{water}:Design", "radiators", "HeatingDesignCapacity", None, None, 0.001, 0.3, 0),
-        idf(water, "the radiator", "radiators", "always", "the radiator in", "the radiator out", HOT - 10.0, 0.16, HEAT,
+        idf(water, "the radiator", "radiators", "always", "the radiator in", "the radiator out", HOT - 6.0, 0.16, HEAT,
             0.16e-3, "radiator n", 1.0),
         outputs("the heater", "Baseboard Total Heating Rate", "Baseboard Electricity Rate"),
-        outputs("the radiator", "Baseboard Total Heating Rate", "Baseboard Water Mass Flow Rate",
-                "Baseboard Water Inlet Temperature"),
+        outputs("the radiator", "Baseboard Total Heating Rate"),
+        *(outputs(f"the radiator {end}", "System Node Temperature", "System Node Mass Flow Rate")
+          for end in ("in", "out")),
     ])  # fmt: skip
 
 
@@ -167,7 +173,8 @@ def _fan_coil_model() -> str:
         idf("OutdoorAir:Mixer", "coil mixer", "coil 0", "coil outdoor", "coil relief", "fan coil exhaust"),
         idf("OutdoorAir:Node", "coil outdoor"),
         idf("Fan:OnOff", "coil fan", "always", 0.5, 0.5 * FAN / volume, volume, 0.9, 1.0, "coil 0", "coil 1"),
-        idf("Coil:Cooling:Water", "cold coil", "always", FLOW, volume, CHILLED, 25.5, 13.5, 0.010, 0.0088,
+        idf("Coil:Cooling:Water", "cold coil", "always", FLOW, volume, CHILLED, COIL_IN[0], COIL_OUT[0], COIL_IN[1],
+            COIL_OUT[1],
             "cold coil in", "cold coil out", "coil 1", "coil 2", "SimpleAnalysis", "CrossFlow"),
         idf("Coil:Heating:Water", "hot coil", "always", 260.0, FLOW, "hot coil in", "hot coil out", "coil 2",
             "fan coil supply", "UFactorTimesAreaAndDesignWaterFlowRate", "autosize", HOT, 20, HOT - 10, 40, 0.5),
@@ -197,7 +204,7 @@ def _unitary_model() -> str:
             0, "Fan:OnOff", "unit fan", heating, "warm coil", 0.001, cooling, "cool coil", 0.001,
             "Coil:Heating:Electric", "more heat", 60, 21, "BlowThrough", "cycling"),
         idf("Fan:OnOff", "unit fan", "always", 0.5, 0.5 * FAN / volume, volume, 0.9, 1.0, "unitary exhaust", "unit 1"),
-        idf(cooling, "cool coil", "always", COLD, 0.75, DX_COP, volume, None, None, "unit 1", "unit 2", "dx capacity",
+        idf(cooling, "cool coil", "always", COLD, SENSIBLE, DX_COP, volume, None, None, "unit 1", "unit 2", "dx capacity",
             "flat", "dx input", "flat", "loss"),
         idf(heating, "warm coil", "always", HEAT, HEATING_COP, volume, None, None, "unit 2", "unit 3", "heat capacity",
             "flat", "heat input", "flat", "loss", "one", -40, None, DEFROST.highest - FREEZING, 0, None, 0,
@@ -227,3 +234,128 @@ def _ventilator_model() -> str:
         outputs("exchanger", "Heat Exchanger Sensible Heating Rate", "Heat Exchanger Sensible Cooling Rate"),
         outputs("fresh air", "System Node Mass Flow Rate", "System Node Temperature"),
     ])  # fmt: skip
+
+
+def _at(table: pd.DataFrame, zone: str) -> Conditions:
+    """What a unit meets: its zone's air and the weather, shape (n_time, 1)."""
+    temperature = column(table, zone, "Zone Mean Air Temperature")[:, None] + FREEZING
+    outdoor = column(table, "ENVIRONMENT", "Site Outdoor Air Drybulb Temperature")[:, None] + FREEZING
+    damp, inside = (column(table, key, what)[:, None] for key, what in (
+        ("ENVIRONMENT", "Site Outdoor Air Humidity Ratio"), (zone, "Zone Air Humidity Ratio")))  # fmt: skip
+    return Conditions(temperature, None, None, outdoor, damp, inside)
+
+
+def _ran(group: Group, now: Conditions, warm: np.ndarray, cold: np.ndarray, water: dict[str, float] | None = None) -> Any:
+    """Run a group of one for calls of shape (n_time,), with water of constant temperatures [K] by port."""
+    given = Given(now, Calls(warm[:, None], cold[:, None]), {}, {}, 900.0, lambda port, message: None)
+    done = group.run(NumpyOperations(), given)
+    if water is None:
+        return done
+    told: Any = None
+    try:
+        while True:
+            port = done.send(told)
+            told = SupplyWater(water[port]) if isinstance(told, HotWater) else HotWater(1.0, water[port])
+    except StopIteration as end:
+        return end.value
+
+
+def _heater(table: pd.DataFrame) -> list[Row]:
+    """Compare the electric heater, for the share of time that it is on."""
+    model, theirs = "ZoneHVAC:Baseboard:Convective:Electric", column(table, "the heater", "Baseboard Total Heating Rate")
+    group = ElectricHeaters(np.array([HEAT]), ONE, radiant_share=0.0)
+    done = _ran(group, _at(table, "electric"), theirs / HEAT, 0.0 * theirs)
+    used = column(table, "the heater", "Baseboard Electricity Rate")
+    return [row("electric heater", model, "electricity", used, done.electric_power)]
+
+
+def _radiator(table: pd.DataFrame) -> list[Row]:
+    """Compare the radiator with EnergyPlus' water, rated near where it works.
+
+    EnergyPlus' heat is linear in the overtemperature, ours goes with its power 1.3.
+    """
+    flow = column(table, "the radiator in", "System Node Mass Flow Rate")
+    # EnergyPlus' rated heat is at a mean water temperature in air of 18 degC
+    mean, drop = HOT - 6.0, HEAT / (0.16 * WATER_HEAT_CAPACITY)
+    ends = (mean + 0.5 * drop + FREEZING, mean - 0.5 * drop + FREEZING)
+    group = Radiators(np.array([HEAT]), ONE, 1.3, *ends, 18.0 + FREEZING)
+    # its flow is full for a share of the time: heat goes with it
+    over = HOT - column(table, "radiator", "Zone Mean Air Temperature")
+    heat = group.emitted(group.water_flow, over) * flow / group.water_flow
+    theirs = flow * WATER_HEAT_CAPACITY * (HOT - column(table, "the radiator out", "System Node Temperature"))
+    return [row("radiator", "ZoneHVAC:Baseboard:RadiantConvective:Water", "heat", theirs, heat)]
+
+
+def _fan_coil(table: pd.DataFrame) -> list[Row]:
+    """Compare the fan coil, as it brings the heat and the sensible cooling that EnergyPlus' does."""
+    model = "ZoneHVAC:FourPipeFanCoil"
+    heating = column(table, "hot coil", "Heating Coil Heating Rate")
+    # ours is rated where EnergyPlus' coils are: by UA and flows, and by the air at the design
+    coil = WaterCoil(260.0 * 1.5, 260.0 * 3.0, AIR, FLOW * 1000.0).conductance(FloatOperations(), AIR)
+    (inlet, damp), (outlet, dry) = COIL_IN, COIL_OUT
+    cooling = AIR * (1006.0 * (inlet - outlet) + 2.454e6 * (damp - dry))
+    group = FanCoils(
+        np.array([coil * (HOT - 20.0)]), np.array([cooling]), ONE, np.array([AIR]), np.array([FAN]), COIL_BYPASS,
+        SITE_PRESSURE, hot_water=HOT + FREEZING, chilled_water=CHILLED + FREEZING,
+        rated=(293.15, inlet + FREEZING, damp),
+    )  # fmt: skip
+    water = {"hot_water": HOT + FREEZING, "chilled_water": CHILLED + FREEZING}
+    now, none = _at(table, "fan coil"), np.zeros(len(table))
+    warmed = column(table, "the fan coil", "Fan Coil Heating Rate")
+    cooled = column(table, "the fan coil", "Fan Coil Sensible Cooling Rate")
+    most, least = (_ran(group, now, none + a, none + b, water).heat[:, 0] for a, b in ((1.0, 0.0), (0.0, 1.0)))
+    done = _ran(group, now, warmed / most, cooled / -least, water)
+    total = column(table, "cold coil", "Cooling Coil Total Cooling Rate")
+    fan = column(table, "coil fan", "Fan Electricity Rate")
+    return [
+        row("fan coil", model, "heat of the water", heating, done.heating),
+        row("fan coil", model, "cold of the water", total, done.cooling + done.moisture),
+        row("fan coil", model, "fan", fan, done.electric_power),
+    ]
+
+
+def _unitary(table: pd.DataFrame) -> list[Row]:
+    """Compare the unitary heat pump, as it brings the heat and the total cooling that EnergyPlus' does."""
+    warm, cold = "Coil:Heating:DX:SingleSpeed", "Coil:Cooling:DX:SingleSpeed"
+    heating = MachineMap(HEATING_COP, DX_HEATING_CAPACITY, DX_HEATING_INPUT, cycling_loss=LOSS, defrost=DEFROST)
+    cooling = MachineMap(DX_COP, DX_CAPACITY, DX_INPUT, cycling_loss=LOSS)
+    group = UnitaryUnits(
+        np.array([HEAT]), np.array([COLD]), ONE, np.array([AIR]), np.array([FAN]),
+        bypass_factor(COLD, AIR / DENSITY, SENSIBLE), SITE_PRESSURE, heating,
+        cooling, np.array([RESISTANCE]),
+    )  # fmt: skip
+    now, ops = _at(table, "unitary"), NumpyOperations()
+    outdoor = now.outdoor_temperature
+    frost = heating.frosted(ops, outdoor, now.outdoor_humidity)
+    able = heating.available(ops, HEAT, now.zone_temperature, outdoor, frost)[:, 0]
+    wet = wet_bulb(ops, now.zone_temperature, now.return_humidity, SITE_PRESSURE)
+    most = cooling.available(ops, COLD, wet, outdoor, cooling.frosted(ops, outdoor, 0.0))[:, 0]
+    heat = column(table, "warm coil", "Heating Coil Heating Rate") + column(table, "more heat", "Heating Coil Heating Rate")
+    total = column(table, "cool coil", "Cooling Coil Total Cooling Rate")
+    done = _ran(group, now, heat / (able + RESISTANCE), total / most)
+    extra = column(table, "more heat", "Heating Coil Heating Rate")
+    used = column(table, "warm coil", "Heating Coil Electricity Rate") + column(
+        table, "warm coil", "Heating Coil Defrost Electricity Rate"
+    )
+    chilled = column(table, "cool coil", "Cooling Coil Electricity Rate")
+    sensible = column(table, "cool coil", "Cooling Coil Sensible Cooling Rate")
+    both, cools = done.electric_power[:, 0] - done.fan_power[:, 0], total > 0.0
+    return [
+        row("unitary heat pump", warm, "electricity, defrosting and resistance", used + extra, both * ~cools),
+        row("unitary heat pump", cold, "electricity", chilled, both * cools),
+        row("unitary heat pump", cold, "sensible cooling", sensible, done.cooling),
+        row("unitary heat pump", "Fan:OnOff", "fan", column(table, "unit fan", "Fan Electricity Rate"), done.fan_power),
+    ]
+
+
+def _ventilator(table: pd.DataFrame) -> list[Row]:
+    """Compare the heat that the ventilator recovers, frost and all."""
+    now = _at(table, "ventilator")
+    group = Ventilators(np.array([AIR_RATE]), ONE, np.zeros(1), EFFECTIVENESS)
+    none = np.zeros(len(table))
+    recovered = _ran(group, now, none, none).recovered[:, 0]
+    model = "HeatExchanger:AirToAir:SensibleAndLatent"
+    pairs = {"heat recovered": ("Heating", np.maximum(recovered, 0.0)),
+             "cold recovered": ("Cooling", np.maximum(-recovered, 0.0))}  # fmt: skip
+    return [row("ventilator", model, what, column(table, "exchanger", f"Heat Exchanger Sensible {kind} Rate"), values)
+            for what, (kind, values) in pairs.items()]  # fmt: skip

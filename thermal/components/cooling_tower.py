@@ -12,6 +12,8 @@ from thermal.components.moist_air import WATER_HEAT_CAPACITY, enthalpy, saturate
 from thermal.components.operations import FloatOperations, Operations, Value
 from thermal.units import AIR_HEAT_CAPACITY
 
+_LITTLE = 10.0  # J/kg: with less the air's heat capacity is that where nothing is taken up
+_PASSES = 3  # the air's heat capacity moves by less than 0.1 % in the last
 _MOST = 1.5e5  # J/kg that the air takes up: beyond it a tower boils
 _FREE = 0.1  # air and UA of free convection over those with the fan: EnergyPlus' defaults
 
@@ -88,20 +90,21 @@ class CoolingTower(Component):
         )
         return cls(float(found), **design)
 
-    def _leaving(self, ops: Operations, rejected: Value, wet_bulb: Value, share: float) -> Value:
-        """Water that leaves with a share of air and UA [K]."""
+    def _transfer(self, ops: Operations, rejected: Value, wet_bulb: Value, share: float) -> Value:
+        """Heat per difference between water and wet bulb that enter, with a share of air and UA [W/K]."""
         water, air = WATER_HEAT_CAPACITY * self.water_flow, share * self.air_flow
-        rejected = ops.maximum(rejected, 1e-6 * self.conductance, self.conductance)
         start = enthalpy(wet_bulb, saturation_humidity(ops, wet_bulb, self.pressure))
-        leaving = saturated_temperature(ops, start + ops.minimum(rejected / air, _MOST, 1e4), self.pressure)
-        heat_capacity = (enthalpy(leaving, saturation_humidity(ops, leaving, self.pressure)) - start) / (
-            ops.maximum(leaving - wet_bulb, 1e-3, 1e-2)
-        )
+        taken = ops.clip(rejected / air, _LITTLE, _MOST, 1e3)
+        heat_capacity = taken / (saturated_temperature(ops, start + taken, self.pressure) - wet_bulb)
         least, most = ops.ordered(air * heat_capacity, water)
         ratio = 0.999 * least / most
         decay = ops.exp(-share * self.conductance * heat_capacity / (AIR_HEAT_CAPACITY * least) * (1.0 - ratio))
-        effectiveness = (1.0 - decay) / (1.0 - ratio * decay)
-        return wet_bulb + rejected / (effectiveness * least) - rejected / water
+        return (1.0 - decay) / (1.0 - ratio * decay) * least
+
+    def _leaving(self, ops: Operations, rejected: Value, wet_bulb: Value, share: float) -> Value:
+        """Water that leaves with a share of air and UA [K]."""
+        water = WATER_HEAT_CAPACITY * self.water_flow
+        return wet_bulb + rejected / self._transfer(ops, rejected, wet_bulb, share) - rejected / water
 
     def cool(self, ops: Operations, rejected: Value, wet_bulb: Value) -> TowerStep:
         """Cool the condenser's water.
@@ -116,8 +119,16 @@ class CoolingTower(Component):
             Wet bulb outdoors [K].
         """
         free, forced = (self._leaving(ops, rejected, wet_bulb, share) for share in (_FREE, 1.0))
-        # what the fan takes off the temperature goes with the time that it runs
-        duty = ops.clip((free - self.setpoint) / ops.maximum(free - forced, 0.1), 0.0, 1.0)
-        duty = duty * rejected / (rejected + 1e-3 * self.conductance)  # still where nothing is rejected
-        water = free + duty * (forced - free)
+        water = ops.minimum(free, ops.maximum(self.setpoint, forced))
+        # with water that comes as warm as it does at the setpoint, what fan and free convection would reject
+        lift = ops.positive(self.setpoint + rejected / (WATER_HEAT_CAPACITY * self.water_flow) - wet_bulb)
+        still, blown = (self._rejected(ops, lift, wet_bulb, share) for share in (_FREE, 1.0))
+        duty = ops.clip((rejected - still) / (blown - still + 1e-3 * self.conductance), 0.0, 1.0)
         return TowerStep(water, duty * self.fan_power, duty)
+
+    def _rejected(self, ops: Operations, lift: Value, wet_bulb: Value, share: float) -> Value:
+        """Heat that water of a temperature above the wet bulb [K] gives off, by three passes [W]."""
+        found = share * self.conductance * lift
+        for _ in range(_PASSES):
+            found = self._transfer(ops, found, wet_bulb, share) * lift
+        return found

@@ -45,7 +45,7 @@ class Frosted(NamedTuple):
     Parameters
     ----------
     capacity, power : Value
-        Over those without frost [-].
+        Most output, and electric power at full load, over those without frost [-].
     taken : Value
         Heat that melts the frost, over the rated capacity [-].
     added : Value
@@ -77,8 +77,8 @@ class Defrost(Component):
     Notes
     -----
     EnergyPlus Engineering Reference 26.1, DX heating coil, on demand: the coil is at ``0.82 T - 8.589`` degC;
-    ``dw = max(1e-6, w - w_sat(T_coil))``, time share ``t = 1 / (1 + 0.01446 / dw)``, capacity ``0.875 (1 - t)``, input
-    ``0.954 (1 - t)``; a reversed cycle takes ``0.01 t (7.222 - T) Q_rated / 1.01667``.
+    ``dw = max(1e-6, w - w_sat(T_coil))``, time share ``t = 1 / (1 + 0.01446 / dw)``; output is ``0.875 (1 - t)`` and power
+    ``0.954 (1 - t)`` of those without frost; a reversed cycle takes ``0.01 t (7.222 - T) Q_rated / 1.01667``.
     """
 
     ports = (Port("power", "electricity", "W"),)
@@ -209,14 +209,15 @@ class MachineMap(Component):
             Humidity ratio outdoors, for frost [kg/kg].
         """
         frost = self.frosted(ops, other, humidity)
+        x, y = celsius(use), celsius(other)
         most = self.available(ops, capacity, use, other, frost)
         load = ops.clip(wanted / most, 0.0, 1.0)
         level = ops.maximum(load, self.minimum)
         duty = load / level
         time = duty / (1.0 - self.cycling_loss * (1.0 - duty))
-        # what melts the frost is output too: it is made at the same price
-        made = most + capacity * frost.taken
-        working = made * self.input_curve(ops, celsius(use), celsius(other)) * self.part_load(ops, level) * frost.power
+        # frost takes more of the output than of the power: that is of the output that there would be without
+        full = capacity * self.capacity_curve(ops, x, y) * frost.power
+        working = full * self.input_curve(ops, x, y) * self.part_load(ops, level)
         rated = capacity / self.cop
         power = time * (working / self.cop + rated * self.running_share + capacity * frost.added)
         return MachineStep(load * most, power + rated * self.standing_share, time, most)

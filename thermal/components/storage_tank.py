@@ -14,6 +14,9 @@ from thermal.components.pump import Pump
 from thermal.components.streams import HotWater, SupplyWater, WaterDrawn
 
 _LAYERS = 4
+_PARTS = 4  # of a step, each by implicit Euler: at 5 minutes a layer's water does not change more than once in one
+#: A temperature as ``a + b T`` of the water that charges.
+Line = tuple[Value, Value]
 _CONDUCTIVITY = 0.64  # W/m/K, of water at 50 degC (IAPWS)
 _LITRES = 0.03  # m3 per kW: 30 l, within the 20 to 50 that makers of heat pumps ask for
 
@@ -88,9 +91,9 @@ class StorageTank(Component):
     Notes
     -----
     Water moves from layer to layer by the difference of both flows, always from where it comes (upwind); layers conduct
-    with that of still water, and where a lower one is warmer at the start of the step they mix. The balances of all
-    layers are taken at the end of the step and solved together with what draws: unconditionally stable, and the tank's
-    balance closes. Four layers mix as four stirred tanks in a row do; EnergyPlus' WaterHeater:Stratified has the same
+    with that of still water, and where a lower one is warmer at the start of the step they mix. A step has four
+    parts; in each the balances of all layers are taken at its end, solved together with what draws: unconditionally
+    stable, and the tank's balance closes. Those that draw see the top's mean over the step. Four layers mix as four stirred tanks in a row do; EnergyPlus' WaterHeater:Stratified has the same
     equations, with more nodes if wanted.
     """
 
@@ -126,8 +129,8 @@ class StorageTank(Component):
 
     def layers_end(
         self, ops: Operations, before: Sequence[Value], flows: TankFlows, room: Value, seconds: Value
-    ) -> list[tuple[Value, Value]]:
-        """Solve the layers' balances at the end of a step; each is ``a + b T`` of the water T that charges [K].
+    ) -> tuple[list[Line], list[Line]]:
+        """Solve the layers' balances; their temperatures are ``a + b T`` of the water T that charges [K].
 
         Parameters
         ----------
@@ -141,29 +144,39 @@ class StorageTank(Component):
             Temperature of the plant room [K].
         seconds : Value
             Length of the step [s].
+
+        Returns
+        -------
+        tuple of list
+            Lines of the layers at the end of the step, and of their means over it.
         """
         n, rate = len(before), WATER_HEAT_CAPACITY
-        mass = self.volume * WATER_DENSITY * rate / n / seconds
+        mass = self.volume * WATER_DENSITY * rate * _PARTS / n / seconds
         down, up = (rate * ops.positive(sign * (flows.charge - flows.draw), 0.1) for sign in (1.0, -1.0))
         # exactly the difference, however smooth
         up = down - rate * (flows.charge - flows.draw)
         leak, still = self.loss / n, _CONDUCTIVITY * (self.volume / self.height) * n / self.height
         matrix = [[0.0] * n for _ in range(n)]
-        right = [[mass * t + leak * room, 0.0] for t in before]
         for k in range(n):
             matrix[k][k] = mass + leak
         for k in range(n - 1):  # between a layer and the one below
-            mixing = still + mass * ops.step(before[k + 1] - before[k], 0.1)
+            mixing = still + mass / _PARTS * ops.step(before[k + 1] - before[k], 0.1)
             matrix[k][k] += down + mixing
             matrix[k][k + 1] -= up + mixing
             matrix[k + 1][k + 1] += up + mixing
             matrix[k + 1][k] -= down + mixing
         matrix[0][0] += rate * flows.draw
-        right[0][1] += rate * flows.charge
         matrix[-1][-1] += rate * flows.charge
         matrix[-1][0] -= rate * flows.draw - flows.conductance
-        right[-1][0] += flows.source
-        return _solved(matrix, right)
+        lines: list[Line] = [(t, 0.0) for t in before]
+        sums: list[Line] = [(0.0, 0.0)] * n
+        for _ in range(_PARTS):
+            right = [[mass * a + leak * room, mass * b] for a, b in lines]
+            right[0][1] = right[0][1] + rate * flows.charge
+            right[-1][0] = right[-1][0] + flows.source
+            lines = _solved([list(row) for row in matrix], right)
+            sums = [(a + c, b + d) for (a, b), (c, d) in zip(sums, lines, strict=True)]
+        return lines, [(a / _PARTS, b / _PARTS) for a, b in sums]
 
     def run(self, ops: Operations, given: Given) -> Run:
         """Hear what can charge it, offer water, and solve both.
@@ -184,19 +197,19 @@ class StorageTank(Component):
         drawn: WaterDrawn = yield "hot_water"
         flow = self.pump.flow(ops, drawn.flow, 1.0)
         through = TankFlows(charge * pipe.opening, flow, drawn.conductance, drawn.source)
-        lines = self.layers_end(ops, before, through, given.conditions.room_temperature, given.seconds)
-        (offset, slope), taken = lines[-1], rate * through.charge
+        room = given.conditions.room_temperature
+        lines, means = self.layers_end(ops, before, through, room, given.seconds)
+        (offset, slope), taken = means[-1], rate * through.charge
         given.put("charge", WaterDrawn(taken * (1.0 - slope), taken * offset, charge))
         water: SupplyWater = yield "charge"
-        layers = [a + b * water.temperature for a, b in lines]
-        given.put("hot_water", SupplyWater(layers[0]))
+        layers, mean = ([a + b * water.temperature for a, b in each] for each in (lines, means))
+        given.put("hot_water", SupplyWater(mean[0]))
         mass = self.volume * WATER_DENSITY * rate / len(layers) / given.seconds
-        room = given.conditions.room_temperature
         return TankStep(
             *layers,
-            taken * (water.temperature - layers[-1]),
-            drawn.conductance * layers[0] - drawn.source,
-            self.loss / len(layers) * sum(t - room for t in layers),
+            taken * (water.temperature - mean[-1]),
+            drawn.conductance * mean[0] - drawn.source,
+            self.loss / len(layers) * sum(t - room for t in mean),
             mass * sum(t - b for t, b in zip(layers, before, strict=True)),
             through.charge, flow, self.pump.power(flow, self.pump.differential_pressure),
         )  # fmt: skip
@@ -230,7 +243,7 @@ class StorageTank(Component):
         return [done.layer_1_temperature, done.layer_4_temperature, done.electric_power]
 
 
-def _solved(matrix: list[list[Value]], right: list[list[Value]]) -> list[tuple[Value, Value]]:
+def _solved(matrix: list[list[Value]], right: list[list[Value]]) -> list[Line]:
     """Solve a diagonally dominant system with two right-hand sides by elimination; its entries are changed."""
     n = len(matrix)
     for k in range(n):
@@ -239,7 +252,7 @@ def _solved(matrix: list[list[Value]], right: list[list[Value]]) -> list[tuple[V
             for column in range(k + 1, n):
                 matrix[row][column] = matrix[row][column] - factor * matrix[k][column]
             right[row] = [r - factor * p for r, p in zip(right[row], right[k], strict=True)]
-    found: list[tuple[Value, Value]] = []
+    found: list[Line] = []
     for k in reversed(range(n)):
         below = [matrix[k][k + 1 + j] for j in range(len(found))]
         rest = [right[k][side] - sum(c * f[side] for c, f in zip(below, found, strict=True)) for side in (0, 1)]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Annotated, ClassVar, NamedTuple
+from functools import cached_property
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,13 +27,15 @@ from thermal.components.moist_air import (
     saturation_humidity,
     wet_bulb,
 )
-from thermal.components.operations import Operations, Value
+from thermal.components.operations import NumpyOperations, Operations, Value
 from thermal.components.streams import HotWater, SupplyWater, WaterDrawn
+from thermal.errors import ModelError
 from thermal.units import AIR_HEAT_CAPACITY
 
 _WARM, _COLD = 15.0, 11.0  # K: of the air over and under the zone at design, for the flow
 _FAN = 400.0  # W per kg/s of air: 0.3 W/(l/s), usual for fan coils (ASHRAE 90.1-2019, 6.5.3.1.3)
-_LEAST = 1e-9
+_SMALL = 0.1  # K
+_NEWTON = 5  # steps of Newton's rule for a wet surface: within 1e-3 K
 
 #: Direct expansion that heats from air outdoors: EnergyPlus' defrosting on demand, part load with AHRI's loss.
 DX_HEATING = MachineMap(3.36, DX_HEATING_CAPACITY, DX_HEATING_INPUT, cycling_loss=0.15, defrost=Defrost())
@@ -195,17 +198,20 @@ class FanCoils(ZoneUnits):
         Rated supply temperatures [K]; the defaults are those of heat pumps and chillers, 45 and 7 degC (EN 1397).
     hot_difference, chilled_difference : float
         Of the water at the rated heat, for its flow [K] (EN 1397: 5 K).
+    rated : tuple of float
+        Air of the zone that heat is rated at, and temperature and humidity ratio that cooling is [K], [K], [kg/kg];
+        the defaults are EN 1397's 20 degC, and 27 degC with a wet bulb of 19 degC.
     cools : bool
         Whether they have chilled water; without it they have no such port.
 
     Notes
     -----
     Heat is a conductance times what the water is above the zone, ``G = Q_rated / (T_rated - T_room)``, for the share of
-    time that it is on; so is sensible cooling, and moisture condenses by the apparatus dew point with it.
+    time that it is on. The cooling coil has a surface between air and water: ``(T_s - T_water) / R = m (1 - b) (c_p (T -
+    T_s) + L max(w - w_s(T_s), 0))``, with R from the rated total cooling.
     """
 
     label, device = "fan coil", "fan_coil"
-    rooms: ClassVar[tuple[float, float]] = (293.15, 300.15)  # K: EN 1397's 20 and 27 degC
     ports = (
         Port("hot_water", "water", "kg/s"), Port("chilled_water", "chilled_water", "kg/s"),
         Port("heat", "heat", "W", "each"), Port("electric_power", "electricity", "W", "each"),
@@ -215,6 +221,7 @@ class FanCoils(ZoneUnits):
     chilled_water: Annotated[float, Range("K", 274.15, 293.15)] = 280.15
     hot_difference: Annotated[float, Range("K", 1.0, 40.0)] = 5.0
     chilled_difference: Annotated[float, Range("K", 1.0, 20.0)] = 5.0
+    rated: tuple[float, float, float] = (293.15, 300.15, 0.0105)
     cools: bool = True
 
     @property
@@ -259,27 +266,72 @@ class FanCoils(ZoneUnits):
         zone = self.of_zones(ops, given.conditions.zone_temperature)
         warm, cold = self.of_zones(ops, given.calls.heating), self.of_zones(ops, given.calls.cooling)
         pipe: HotWater = yield "hot_water"
-        hot = warm * pipe.opening * (self.heating / (self.hot_water - self.rooms[0]))
+        hot = warm * pipe.opening * (self.heating / (self.hot_water - self.rated[0]))
         given.put("hot_water", self._drawn(ops, hot, zone, warm * self.water_flow))
         water: SupplyWater = yield "hot_water"
         heating, cooling, moisture = hot * (water.temperature - zone), 0.0 * zone, 0.0 * zone
         if self.cools:
             pipe = yield "chilled_water"
-            humidity = self.humidity(given.conditions)
-            # rated cooling is total: of the rated room's half, 19 degC wet bulb, three quarters are sensible
-            dry = 0.75 * self.cooling / (self.rooms[1] - self.chilled_water)
-            running = dry * ops.positive(zone - pipe.warmest)
-            # what condenses is more for the coil to take, so that the surface is where both together put it
-            share = self.sensible_share(ops, running, zone, humidity)
-            share = self.sensible_share(ops, running / share, zone, humidity)
-            open_share = cold * pipe.opening
-            chilled = open_share * dry / share
+            surface = self.surface(ops, pipe.warmest, zone, self.humidity(given.conditions))
+            touched = self.air_flow * (1.0 - self.bypass)
+            dry = AIR_HEAT_CAPACITY * touched * (zone - surface)
+            wet = EVAPORATION_HEAT * touched * self._condensed(ops, surface, self.humidity(given.conditions))
+            # as for valves: what the coil does with the coldest water is a conductance for the water that comes
+            total = ops.positive(dry + wet) / ops.maximum(zone - pipe.warmest, _SMALL, _SMALL)
+            chilled = cold * pipe.opening * total
             given.put("chilled_water", self._drawn(ops, chilled, zone, cold * self.chilled_flow))
             water = yield "chilled_water"
-            total = chilled * (zone - water.temperature)
-            cooling, moisture = share * total, (1.0 - share) * total
+            brought, share = chilled * (zone - water.temperature), dry / ops.maximum(dry + wet, 1.0, 1.0)
+            cooling, moisture = share * brought, (1.0 - share) * brought
         fan = (ops.maximum(warm, cold) if self.cools else warm) * self.fan_power
         return UnitStep(heating - cooling + fan, heating, cooling, moisture, fan, 1.0 * fan)
+
+    def _condensed(self, ops: Operations, surface: Value, humidity: Value) -> Value:
+        """Fall of the humidity ratio where the air touches a surface of a temperature [kg/kg]."""
+        return ops.positive(humidity - saturation_humidity(ops, surface, self.pressure), 1e-3)
+
+    @cached_property
+    def resistance(self) -> FloatArray:
+        """Between the cooling coil's surface and its water [K/W], from the rated cooling."""
+        ops, (_, room, damp) = NumpyOperations(), self.rated
+        touched = self.air_flow * (1.0 - self.bypass)
+        surface = np.full(len(self), room)
+        for _ in range(_NEWTON):
+            surface = self._step(ops, surface, room, damp, 0.0, self.cooling / touched)
+        resistance = (surface - self.chilled_water) / self.cooling
+        if (resistance <= 0.0).any():
+            k = int(np.argmin(resistance))
+            expected = f"less than the air can bring with a coil of {self.chilled_water:g} K, or more air"
+            raise ModelError(f"FanCoils: cooling of unit {k}", expected, f"{self.cooling[k]:g} W")
+        return np.asarray(resistance)
+
+    def surface(self, ops: Operations, water: Value, zone: Value, humidity: Value) -> Value:
+        """Temperature of the cooling coil's surface with water of a temperature [K].
+
+        The heat that the air gives, sensible and latent, is what goes on to the water.
+
+        Parameters
+        ----------
+        ops : Operations
+            Arithmetic.
+        water : Value
+            Chilled water that enters [K].
+        zone, humidity : Value
+            Of the air that enters [K], [kg/kg].
+        """
+        onward = 1.0 / (self.resistance * self.air_flow * (1.0 - self.bypass))
+        found = zone + 0.0
+        for _ in range(_NEWTON):
+            found = self._step(ops, found, zone, humidity, onward, -onward * water)
+        return found
+
+    def _step(self, ops: Operations, at: Value, zone: Value, humidity: Value, slope: Value, offset: Value) -> Value:
+        """Improve by Newton's rule where ``c_p (T - at) + L (w - w_s(at)) = offset + slope at`` [K]."""
+        saturated = saturation_humidity(ops, at, self.pressure)
+        wet = ops.step(humidity - saturated, 1e-3)
+        steep = saturated * 17.625 * 243.04 / (at - 273.15 + 243.04) ** 2
+        excess = AIR_HEAT_CAPACITY * (zone - at) + EVAPORATION_HEAT * wet * (humidity - saturated) - offset - slope * at
+        return at + excess / (AIR_HEAT_CAPACITY + EVAPORATION_HEAT * wet * steep + slope)
 
     def _drawn(self, ops: Operations, conductance: Value, zone: Value, flow: Value) -> WaterDrawn:
         return WaterDrawn(self.total(ops, conductance), ops.dot(conductance, zone), self.total(ops, flow))
@@ -302,8 +354,7 @@ class UnitaryUnits(ZoneUnits):
 
     Notes
     -----
-    A call is a share of what the unit can bring at the time, compressor first. Fan and compressor run for the share of
-    time that this takes.
+    A call is a share of what the unit can bring at the time, compressor first. The fan runs while the compressor does.
     """
 
     label, device = "unitary heat pump", "unitary_heat_pump"
@@ -353,8 +404,8 @@ class UnitaryUnits(ZoneUnits):
             able = machine.available(ops, self.heating, zone, outdoor, frost)
             wanted = warm * (able + self.supplement)
             done = machine.run_at(ops, wanted, self.heating, zone, outdoor, damp)
-            heat, power, time = wanted, done.power + wanted - done.output, wanted / (able + _LEAST)
-        fan = self.fan_power * ops.clip(time + cold, 0.0, 1.0)
+            heat, power, time = wanted, done.power + wanted - done.output, done.duty
+        fan = self.fan_power * ops.clip(time + chilled.duty, 0.0, 1.0)
         cooling = chilled.output * share
         return UnitStep(
             heat - cooling + fan, heat, cooling, chilled.output - cooling, fan, power + chilled.power + fan
