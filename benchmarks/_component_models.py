@@ -1,7 +1,7 @@
 """EnergyPlus' models of single components for `components_energyplus`, written object by object.
 
-Plant components stand on a loop of their own with a `LoadProfile:Plant`; those of zones in a box of their own, all boxes
-the same. Every number that both sides need is in the settings of `_component_plants` and `_component_zones`.
+Plant components stand on a loop of their own with a `LoadProfile:Plant`; those of zones in a box of their own, all
+boxes the same. Every number that both sides need stands at the top of `_component_plants` and `_component_zones`.
 """
 
 from __future__ import annotations
@@ -108,8 +108,8 @@ def loop(name: str, kind: str, component: str, flow: float, setpoint: float, loa
         idf("BranchList", f"{name} supply branches", f"{name} supply branch"),
         idf("Branch", f"{name} supply branch", None, "Pump:VariableSpeed", f"{name} pump", f"{name} begin",
             f"{name} in", kind, component, f"{name} in", end, *((*last, end, f"{name} out") if last else ())),
-        idf("Pump:VariableSpeed", f"{name} pump", f"{name} begin", f"{name} in", flow, 100, 200 * flow, 0.9, 0, 0, 1, 0, 0,
-            0, "Intermittent"),
+        idf("Pump:VariableSpeed", f"{name} pump", f"{name} begin", f"{name} in", flow, 100, 200 * flow, 0.9, 0, 0, 1, 0,
+            0, 0, "Intermittent"),
         idf("BranchList", f"{name} demand branches", f"{name} demand branch"),
     ]  # fmt: skip
     if last:

@@ -1,4 +1,4 @@
-"""Plant components beside EnergyPlus' for `components_energyplus`: heat pumps, boiler, district, chiller, tower, tank."""
+"""Plant components beside EnergyPlus' for `components_energyplus`: what makes, stores and rejects heat."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def compared(folder: Path) -> list[Row]:
 
 
 def _loads() -> dict[str, np.ndarray]:
-    """Loads by the hour [W]: with the temperature outdoors, more in the morning, nothing when it is mild."""
+    """Make loads by the hour [W]: with the temperature outdoors, more in the morning, nothing when it is mild."""
     outdoor = outdoor_hours()
     morning = np.tile(np.where(np.isin(np.arange(24), (6, 7, 8)), 1.4, 0.95), 365)
     heat = np.clip((16.0 - outdoor) / 34.0, 0.0, 1.0) * HEAT * morning
@@ -150,7 +150,7 @@ def _chilled_model() -> list[str]:
 
 
 def _tank_model() -> list[str]:
-    """A tank charged from a district loop by its own control, and drawn from by the profile of heat."""
+    """Write a tank charged from a district loop by its own control, and drawn from by the profile of heat."""
     area = 2.0 * (3.14159 * TANK.volume * TANK.height) ** 0.5 + 2.0 * TANK.volume / TANK.height
     charge, kind = TANK.charge_flow / 1000.0, "WaterHeater:Stratified"
     return [
@@ -162,8 +162,8 @@ def _tank_model() -> list[str]:
         idf(kind, "tank", None, TANK.volume, TANK.height, "VerticalCylinder", None, 90, "MasterSlave", "tank setpoint",
             3, 0, 0.9 * TANK.height, "tank setpoint", 3, 0, 0.3, "Electricity", 1, 0, "Electricity", 0, 0, 0,
             "Electricity", 0, 0, "Schedule", "tank room", None, None, TANK.loss / area, 1, 0, 1, None, None, None,
-            "use in", "use middle", 1, 0, TANK.height, "charge demand in", "charge demand out", 1, TANK.height, 0, "Fixed",
-            DRAW, charge, 1.5, 4),
+            "use in", "use middle", 1, 0, TANK.height, "charge demand in", "charge demand out", 1, TANK.height, 0,
+            "Fixed", DRAW, charge, 1.5, 4),
     ]  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Components in zones beside EnergyPlus' for `components_energyplus`: heater, radiator, fan coil, unitary, ventilator.
+"""Components in zones beside EnergyPlus' for `components_energyplus`: heater, fan coil, unitary, ventilator.
 
 Each stands in a box of its own. Ours get EnergyPlus' zone air, its weather, water temperatures, and for how long the
 thermostat lets each run; what follows is compared.
@@ -22,7 +22,6 @@ from _component_models import (
     row,
     run,
 )
-
 from _hvac_offices import bypass_factor
 
 from thermal.components.component import Calls, Conditions, Given, Group
@@ -34,16 +33,15 @@ from thermal.components.curves import (
 )
 from thermal.components.electric_heaters import ElectricHeaters
 from thermal.components.machine_map import Defrost, MachineMap
-from thermal.components.moist_air import WATER_HEAT_CAPACITY, wet_bulb
+from thermal.components.moist_air import wet_bulb
 from thermal.components.operations import FloatOperations, NumpyOperations
-from thermal.components.radiators import Radiators
 from thermal.components.streams import HotWater, SupplyWater
 from thermal.components.ventilators import Ventilators
 from thermal.components.water_coil import WaterCoil
 from thermal.components.zone_units import FanCoils, UnitaryUnits
 
 FREEZING, SITE_PRESSURE, DENSITY = 273.15, 99_060.0, 1.18  # K, Pa, kg/m3 of air at the site
-ZONES = ("electric", "radiator", "fan coil", "unitary", "ventilator")
+ZONES = ("electric", "fan coil", "unitary", "ventilator")
 HEAT, COLD, AIR, FAN = 7000.0, 6000.0, 0.42, 140.0  # W, W, kg/s, W of the units
 HOT, CHILLED = 60.0, 7.0  # degC
 FLOW = 4e-4  # m3/s of hot or chilled water, the valve open
@@ -57,7 +55,7 @@ DEFROST = Defrost(278.15, input_share=1.0, pressure=SITE_PRESSURE)
 def compared(folder: Path) -> list[Row]:
     """Run EnergyPlus' models and ours."""
     table = run(_model(), folder)
-    return [*_heater(table), *_radiator(table), *_fan_coil(table), *_unitary(table), *_ventilator(table)]
+    return [*_heater(table), *_fan_coil(table), *_unitary(table), *_ventilator(table)]
 
 
 def _box(k: int, zone: str) -> str:
@@ -70,8 +68,8 @@ def _box(k: int, zone: str) -> str:
     }
     parts = [idf("Zone", zone, 0, 0, 0, 0, 1, 1, high, 300)]
     for side, corners in faces.items():
-        behind = ("Adiabatic", None, "NoSun", "NoWind") if side == "floor" else ("Outdoors", None, "SunExposed", "WindExposed")
-        made = "slab" if side == "floor" else "shell"
+        outside = ("Outdoors", None, "SunExposed", "WindExposed")
+        behind, made = (("Adiabatic", None, "NoSun", "NoWind"), "slab") if side == "floor" else (outside, "shell")
         parts.append(idf("BuildingSurface:Detailed", f"{zone} {side}", names[side], made, zone, None, *behind,
                          "autocalculate", 4, *(v for corner in corners for v in corner)))  # fmt: skip
     parts += [
@@ -139,8 +137,7 @@ def _model() -> str:
         idf("ThermostatSetpoint:DualSetpoint", "band", "low", "high"),
         *(_box(k, zone) for k, zone in enumerate(ZONES)),
         _heater_model(), _fan_coil_model(), _unitary_model(), _ventilator_model(),
-        _water("hot", HOT, [("ZoneHVAC:Baseboard:RadiantConvective:Water", "the radiator"),
-                            ("Coil:Heating:Water", "hot coil")], "DistrictHeating:Water"),
+        _water("hot", HOT, [("Coil:Heating:Water", "hot coil")], "DistrictHeating:Water"),
         _water("chilled", CHILLED, [("Coil:Cooling:Water", "cold coil")], "DistrictCooling"),
         outputs("*", "Zone Mean Air Temperature", "Zone Air Humidity Ratio"),
     ]  # fmt: skip
@@ -148,18 +145,11 @@ def _model() -> str:
 
 
 def _heater_model() -> str:
-    electric, water = "ZoneHVAC:Baseboard:Convective:Electric", "ZoneHVAC:Baseboard:RadiantConvective:Water"
+    electric = "ZoneHVAC:Baseboard:Convective:Electric"
     return "".join([
         _served("electric", (electric, "the heater")),
         idf(electric, "the heater", "always", "HeatingDesignCapacity", HEAT, None, None, 1.0),
-        _served("radiator", (water, "the radiator")),
-        idf(f"{water}:Design", "radiators", "HeatingDesignCapacity", None, None, 0.001, 0.3, 0),
-        idf(water, "the radiator", "radiators", "always", "the radiator in", "the radiator out", HOT - 6.0, 0.16, HEAT,
-            0.16e-3, "radiator n", 1.0),
         outputs("the heater", "Baseboard Total Heating Rate", "Baseboard Electricity Rate"),
-        outputs("the radiator", "Baseboard Total Heating Rate"),
-        *(outputs(f"the radiator {end}", "System Node Temperature", "System Node Mass Flow Rate")
-          for end in ("in", "out")),
     ])  # fmt: skip
 
 
@@ -168,7 +158,8 @@ def _fan_coil_model() -> str:
     return "".join([
         _served("fan coil", (unit, "the fan coil"), exhaust="fan coil exhaust"),
         idf(unit, "the fan coil", "always", "CyclingFan", volume, None, None, 0, None, "fan coil exhaust",
-            "fan coil supply", "OutdoorAir:Mixer", "coil mixer", "Fan:OnOff", "coil fan", "Coil:Cooling:Water", "cold coil", FLOW, 0, 0.001,
+            "fan coil supply", "OutdoorAir:Mixer", "coil mixer", "Fan:OnOff", "coil fan",
+            "Coil:Cooling:Water", "cold coil", FLOW, 0, 0.001,
             "Coil:Heating:Water", "hot coil", FLOW, 0, 0.001),
         idf("OutdoorAir:Mixer", "coil mixer", "coil 0", "coil outdoor", "coil relief", "fan coil exhaust"),
         idf("OutdoorAir:Node", "coil outdoor"),
@@ -204,8 +195,8 @@ def _unitary_model() -> str:
             0, "Fan:OnOff", "unit fan", heating, "warm coil", 0.001, cooling, "cool coil", 0.001,
             "Coil:Heating:Electric", "more heat", 60, 21, "BlowThrough", "cycling"),
         idf("Fan:OnOff", "unit fan", "always", 0.5, 0.5 * FAN / volume, volume, 0.9, 1.0, "unitary exhaust", "unit 1"),
-        idf(cooling, "cool coil", "always", COLD, SENSIBLE, DX_COP, volume, None, None, "unit 1", "unit 2", "dx capacity",
-            "flat", "dx input", "flat", "loss"),
+        idf(cooling, "cool coil", "always", COLD, SENSIBLE, DX_COP, volume, None, None, "unit 1", "unit 2",
+            "dx capacity", "flat", "dx input", "flat", "loss"),
         idf(heating, "warm coil", "always", HEAT, HEATING_COP, volume, None, None, "unit 2", "unit 3", "heat capacity",
             "flat", "heat input", "flat", "loss", "one", -40, None, DEFROST.highest - FREEZING, 0, None, 0,
             "ReverseCycle", "OnDemand"),
@@ -237,7 +228,7 @@ def _ventilator_model() -> str:
 
 
 def _at(table: pd.DataFrame, zone: str) -> Conditions:
-    """What a unit meets: its zone's air and the weather, shape (n_time, 1)."""
+    """Give what a unit meets: its zone's air and the weather, shape (n_time, 1)."""
     temperature = column(table, zone, "Zone Mean Air Temperature")[:, None] + FREEZING
     outdoor = column(table, "ENVIRONMENT", "Site Outdoor Air Drybulb Temperature")[:, None] + FREEZING
     damp, inside = (column(table, key, what)[:, None] for key, what in (
@@ -245,7 +236,9 @@ def _at(table: pd.DataFrame, zone: str) -> Conditions:
     return Conditions(temperature, None, None, outdoor, damp, inside)
 
 
-def _ran(group: Group, now: Conditions, warm: np.ndarray, cold: np.ndarray, water: dict[str, float] | None = None) -> Any:
+def _ran(
+    group: Group, now: Conditions, warm: np.ndarray, cold: np.ndarray, water: dict[str, float] | None = None
+) -> Any:
     """Run a group of one for calls of shape (n_time,), with water of constant temperatures [K] by port."""
     given = Given(now, Calls(warm[:, None], cold[:, None]), {}, {}, 900.0, lambda port, message: None)
     done = group.run(NumpyOperations(), given)
@@ -262,28 +255,12 @@ def _ran(group: Group, now: Conditions, warm: np.ndarray, cold: np.ndarray, wate
 
 def _heater(table: pd.DataFrame) -> list[Row]:
     """Compare the electric heater, for the share of time that it is on."""
-    model, theirs = "ZoneHVAC:Baseboard:Convective:Electric", column(table, "the heater", "Baseboard Total Heating Rate")
+    theirs = column(table, "the heater", "Baseboard Total Heating Rate")
+    model = "ZoneHVAC:Baseboard:Convective:Electric"
     group = ElectricHeaters(np.array([HEAT]), ONE, radiant_share=0.0)
     done = _ran(group, _at(table, "electric"), theirs / HEAT, 0.0 * theirs)
     used = column(table, "the heater", "Baseboard Electricity Rate")
     return [row("electric heater", model, "electricity", used, done.electric_power)]
-
-
-def _radiator(table: pd.DataFrame) -> list[Row]:
-    """Compare the radiator with EnergyPlus' water, rated near where it works.
-
-    EnergyPlus' heat is linear in the overtemperature, ours goes with its power 1.3.
-    """
-    flow = column(table, "the radiator in", "System Node Mass Flow Rate")
-    # EnergyPlus' rated heat is at a mean water temperature in air of 18 degC
-    mean, drop = HOT - 6.0, HEAT / (0.16 * WATER_HEAT_CAPACITY)
-    ends = (mean + 0.5 * drop + FREEZING, mean - 0.5 * drop + FREEZING)
-    group = Radiators(np.array([HEAT]), ONE, 1.3, *ends, 18.0 + FREEZING)
-    # its flow is full for a share of the time: heat goes with it
-    over = HOT - column(table, "radiator", "Zone Mean Air Temperature")
-    heat = group.emitted(group.water_flow, over) * flow / group.water_flow
-    theirs = flow * WATER_HEAT_CAPACITY * (HOT - column(table, "the radiator out", "System Node Temperature"))
-    return [row("radiator", "ZoneHVAC:Baseboard:RadiantConvective:Water", "heat", theirs, heat)]
 
 
 def _fan_coil(table: pd.DataFrame) -> list[Row]:
@@ -330,10 +307,10 @@ def _unitary(table: pd.DataFrame) -> list[Row]:
     able = heating.available(ops, HEAT, now.zone_temperature, outdoor, frost)[:, 0]
     wet = wet_bulb(ops, now.zone_temperature, now.return_humidity, SITE_PRESSURE)
     most = cooling.available(ops, COLD, wet, outdoor, cooling.frosted(ops, outdoor, 0.0))[:, 0]
-    heat = column(table, "warm coil", "Heating Coil Heating Rate") + column(table, "more heat", "Heating Coil Heating Rate")
+    extra = column(table, "more heat", "Heating Coil Heating Rate")
+    heat = column(table, "warm coil", "Heating Coil Heating Rate") + extra
     total = column(table, "cool coil", "Cooling Coil Total Cooling Rate")
     done = _ran(group, now, heat / (able + RESISTANCE), total / most)
-    extra = column(table, "more heat", "Heating Coil Heating Rate")
     used = column(table, "warm coil", "Heating Coil Electricity Rate") + column(
         table, "warm coil", "Heating Coil Defrost Electricity Rate"
     )

@@ -136,7 +136,7 @@ class LocalControl:
         flows = (warm, warm, least, least, least, cool, cool)
         discharge = (limit, limit, limit, air, air, air, air)
         heat = np.stack([
-            np.bincount(zone, AIR_HEAT_CAPACITY * flow * (leaving - end[zone]), system.zone_count)
+            system.by_zone(AIR_HEAT_CAPACITY * flow * (leaving - end[zone]))
             for flow, leaving, end in zip(flows, discharge, ends, strict=True)
         ])  # fmt: skip
         calls = (1.0, 1.0, min(first, 0.999), 0.0, 0.0, -1.0, -1.0)

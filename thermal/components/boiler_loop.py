@@ -64,7 +64,7 @@ class BoilerLoop(WaterLoop):
     def takes(
         self, ops: Operations, conditions: Conditions, produced: Value, water: Value, back: Value
     ) -> Production:
-        """What the heat takes: fuel.
+        """Tell what the heat takes: fuel.
 
         Parameters
         ----------

@@ -12,7 +12,7 @@ from thermal.components.machine_map import MachineMap, MachineStep
 from thermal.components.moist_air import wet_bulb
 from thermal.components.operations import Operations, Value
 from thermal.components.pump import Pump
-from thermal.components.water_loop import LoopStep, Production, WaterLoop
+from thermal.components.water_loop import SHORT_PIPES, LoopStep, Production, WaterLoop
 
 _PASSES = 2  # chiller, tower, chiller: the condenser's water moves by less than 0.1 K in the last
 
@@ -70,7 +70,7 @@ class ChillerLoop(WaterLoop):
         water_flow : float
             Through the open valves of all that draw from the loop [kg/s].
         """
-        return cls(1.15 * capacity, Pump(water_flow), **cls.pipes(capacity, water_flow))
+        return cls(1.15 * capacity, Pump(water_flow), **cls.pipes(capacity, water_flow, SHORT_PIPES))
 
     def chilled(
         self, ops: Operations, wanted: Value, water: Value, conditions: Conditions
@@ -114,7 +114,7 @@ class ChillerLoop(WaterLoop):
         return self.chilled(ops, 2.0 * self.capacity, water, conditions)[0].available
 
     def takes(self, ops: Operations, conditions: Conditions, produced: Value, water: Value, back: Value) -> Production:
-        """What the cooling takes: electricity of the chiller, the tower's fan and its pump.
+        """Tell what the cooling takes: electricity of the chiller, the tower's fan and its pump.
 
         Parameters
         ----------

@@ -8,7 +8,7 @@ from typing import Annotated
 from thermal.components.component import Actuator, Conditions, Given, Port, Range, State
 from thermal.components.operations import Operations, Value
 from thermal.components.pump import Pump
-from thermal.components.water_loop import LoopStep, Production, WaterLoop
+from thermal.components.water_loop import SHORT_PIPES, LoopStep, Production, WaterLoop
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class DistrictLoop(WaterLoop):
         water_flow : float
             Through the open valves of all that draw from the loop [kg/s].
         """
-        return cls(capacity, Pump(water_flow), **cls.pipes(capacity, water_flow))
+        return cls(capacity, Pump(water_flow), **cls.pipes(capacity, water_flow, SHORT_PIPES))
 
     def can(self, ops: Operations, conditions: Conditions, water: Value) -> Value:
         """Most heat through the exchanger [W].
@@ -80,7 +80,7 @@ class DistrictLoop(WaterLoop):
         return self.capacity * ops.positive(share)
 
     def takes(self, ops: Operations, conditions: Conditions, produced: Value, water: Value, back: Value) -> Production:
-        """What the heat takes: as much from the network.
+        """Tell what the heat takes: as much from the network.
 
         Parameters
         ----------

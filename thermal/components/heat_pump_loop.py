@@ -10,7 +10,7 @@ from thermal.components.curves import AIR_SOURCE_INPUT, DX_HEATING_CAPACITY, DX_
 from thermal.components.machine_map import MachineMap
 from thermal.components.operations import Operations, Value
 from thermal.components.pump import Pump
-from thermal.components.water_loop import LoopStep, Production, WaterLoop
+from thermal.components.water_loop import SHORT_PIPES, LoopStep, Production, WaterLoop
 
 #: Air to water: COP of Staffell et al. (2012), defrosting in it; capacity as air-source direct expansion has it.
 AIR_TO_WATER = MachineMap(
@@ -70,7 +70,7 @@ class HeatPumpLoop(WaterLoop):
         water_flow : float
             Through the open valves of all that draw from the loop [kg/s].
         """
-        pipes = cls.pipes(capacity, water_flow)
+        pipes = cls.pipes(capacity, water_flow, SHORT_PIPES)
         return cls(_STEEP * capacity, Pump(water_flow), backup=0.5 * capacity, **pipes)
 
     def source(self, conditions: Conditions) -> Value:
@@ -100,7 +100,7 @@ class HeatPumpLoop(WaterLoop):
         return self.machine.available(ops, self.capacity, water, source, frost) + self.backup
 
     def takes(self, ops: Operations, conditions: Conditions, produced: Value, water: Value, back: Value) -> Production:
-        """What the heat takes: electricity of the heat pump, and of the resistance for what it cannot bring.
+        """Tell what the heat takes: electricity of the heat pump, and of the resistance for what it cannot bring.
 
         Parameters
         ----------

@@ -70,22 +70,23 @@ class Defrost(Component):
         True: the cycle is reversed, and its heat is from the building. False: resistance.
     input_share : float
         Electric power while it defrosts over the rated capacity [-]: of the compressor, or of the resistance. The
-        default for the reversed cycle is 1 as EnergyPlus has it where no curve is given.
+        default is that of the Small Office's heat pump in ASHRAE's 90.1 prototypes, 2019 (HPACCOOLEIRFT at the lowest
+        temperatures of its range).
     pressure : float
         Of the air [Pa].
 
     Notes
     -----
     EnergyPlus Engineering Reference 26.1, DX heating coil, on demand: the coil is at ``0.82 T - 8.589`` degC;
-    ``dw = max(1e-6, w - w_sat(T_coil))``, time share ``t = 1 / (1 + 0.01446 / dw)``; output is ``0.875 (1 - t)`` and power
-    ``0.954 (1 - t)`` of those without frost; a reversed cycle takes ``0.01 t (7.222 - T) Q_rated / 1.01667``.
+    ``dw = max(1e-6, w - w_sat(T_coil))``, time share ``t = 1 / (1 + 0.01446 / dw)``; output is ``0.875 (1 - t)`` and
+    power ``0.954 (1 - t)`` of those without frost; a reversed cycle takes ``0.01 t (7.222 - T) Q_rated / 1.01667``.
     """
 
     ports = (Port("power", "electricity", "W"),)
 
     highest: Annotated[float, Range("K", 263.15, 288.15)] = 278.15
     reverse: bool = True
-    input_share: Annotated[float, Range("-", 0.0, 3.0)] = 1.0
+    input_share: Annotated[float, Range("-", 0.0, 3.0)] = 0.8
     pressure: Annotated[float, Range("Pa", 5e4, 1.1e5)] = 101_325.0
 
     def frosted(self, ops: Operations, outdoor: Value, humidity: Value) -> Frosted:
@@ -102,7 +103,8 @@ class Defrost(Component):
         """
         cold, degrees = ops.step(self.highest - outdoor), celsius(outdoor)
         coil = 273.15 + 0.82 * degrees - 8.589
-        excess = ops.maximum(humidity - saturation_humidity(ops, coil, self.pressure), _LEAST_FROST, 1e-3)
+        vapour = ops.minimum(humidity, saturation_humidity(ops, outdoor, self.pressure), 1e-3)  # air carries no more
+        excess = ops.maximum(vapour - saturation_humidity(ops, coil, self.pressure), _LEAST_FROST, 1e-3)
         time = cold / (1.0 + 0.01446 / excess)
         capacity, power = (1.0 + cold * (whole * (1.0 - time) - 1.0) for whole in (0.875, 0.954))
         taken = 0.01 * time * (7.222 - degrees) / 1.01667 if self.reverse else 0.0

@@ -49,11 +49,11 @@ class MixingValve(Component):
 
     Notes
     -----
-    With a share x of fresh water ``T_mixed = x T_supply + (1 - x) T_return``, and ``T_return = T_mixed - (G T_mixed - H)
-    / (m c)`` of the load: ``T_mixed = (x T_supply + (1 - x) h) / (x + (1 - x) g)``, with ``g = G / (m c)`` and ``h = H /
-    (m c)``, linear in the supply. x is what brings the setpoint with the warmest water of the step, as valves of
-    terminals are set: ``x = (T_set - T_return) / (T_warmest - T_return)``, as far
-    as its supplier lets water through.
+    With a share x of fresh water ``T_mixed = x T_supply + (1 - x) T_return``, and with ``T_return = T_mixed - (G
+    T_mixed - H) / (m c)`` of the load ``T_mixed = (x T_supply + (1 - x) h) / (x + (1 - x) g)``, where ``g = G / (m c)``
+    and ``h = H / (m c)``: linear in the supply. x is what brings the setpoint with the warmest water of the step, as
+    valves of terminals are set, ``x = (T_set - T_return) / (T_warmest - T_return)``, as far as its supplier lets water
+    through.
     """
 
     label, device = "mixing valve", "mixing_valve"

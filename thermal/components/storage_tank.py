@@ -91,10 +91,10 @@ class StorageTank(Component):
     Notes
     -----
     Water moves from layer to layer by the difference of both flows, always from where it comes (upwind); layers conduct
-    with that of still water, and where a lower one is warmer at the start of the step they mix. A step has four
-    parts; in each the balances of all layers are taken at its end, solved together with what draws: unconditionally
-    stable, and the tank's balance closes. Those that draw see the top's mean over the step. Four layers mix as four stirred tanks in a row do; EnergyPlus' WaterHeater:Stratified has the same
-    equations, with more nodes if wanted.
+    with that of still water, and where a lower one is warmer at the start of the step they mix. A step has four parts;
+    in each the balances of all layers are taken at its end, solved together with what draws: unconditionally stable,
+    and the tank's balance closes. Those that draw see the top's mean over the step. Four layers mix as four stirred
+    tanks in a row do; EnergyPlus' WaterHeater:Stratified has the same equations, with more nodes if wanted.
     """
 
     label, device = "storage tank", "storage_tank"

@@ -59,8 +59,8 @@ class Ventilators(Group):
 
     Notes
     -----
-    ``T_supply = T_out + eps (T_zone - T_out)``, with ``eps <= (T_zone - T_least) / (T_zone - T_out)`` against frost, and
-    without exchanger as far as the zone calls for cooling while it is cooler outdoors.
+    ``T_supply = T_out + eps (T_zone - T_out)``, with ``eps <= (T_zone - T_least) / (T_zone - T_out)`` against frost,
+    and without exchanger as far as the zone calls for cooling while it is cooler outdoors.
     """
 
     label, device = "ventilator", "heat_recovery_ventilator"

@@ -15,6 +15,7 @@ from thermal.components.streams import HotWater, SupplyWater, WaterDrawn
 
 _LEAST = 1e-9
 _LEAST_PIPES = 20.0  # W/K
+SHORT_PIPES = 5.0  # W/K: 25 m of insulated pipe of a house, 0.2 W/m/K (EN 15316-3)
 _LITRES = 0.01  # m3 of water per kW, usual for loops of steel pipe
 
 
@@ -145,7 +146,7 @@ class WaterLoop(Component):
         in_range(f"{type(self).__name__}.pipe_conductance", self.pipe_conductance, "W/K", 0.0, highest)
 
     @staticmethod
-    def pipes(capacity: float, water_flow: float) -> dict[str, float]:
+    def pipes(capacity: float, water_flow: float, least: float = _LEAST_PIPES) -> dict[str, float]:
         """Size water and pipes, as named parameters.
 
         Parameters
@@ -154,8 +155,10 @@ class WaterLoop(Component):
             Largest heat [W].
         water_flow : float
             Through the open valves of all that draw from the loop [kg/s].
+        least : float
+            Conductance that short pipes have too [W/K].
         """
-        pump, pipes = Pump(water_flow), max(_LEAST_PIPES, 1e-3 * capacity / 10.0)
+        pump, pipes = Pump(water_flow), max(least, 1e-3 * capacity / 10.0)
         most = 0.4 * pump.minimum_share * pump.design_flow * WATER_HEAT_CAPACITY
         return {
             "pipe_conductance": min(pipes, most), "standing_conductance": 0.25 * pipes,
@@ -189,7 +192,7 @@ class WaterLoop(Component):
     def takes(
         self, ops: Operations, conditions: Conditions, produced: Value, water: Value, back: Value
     ) -> Production:
-        """What it takes to bring heat, or cold.
+        """Tell what it takes to bring heat, or cold.
 
         Parameters
         ----------

@@ -207,8 +207,8 @@ class FanCoils(ZoneUnits):
     Notes
     -----
     Heat is a conductance times what the water is above the zone, ``G = Q_rated / (T_rated - T_room)``, for the share of
-    time that it is on. The cooling coil has a surface between air and water: ``(T_s - T_water) / R = m (1 - b) (c_p (T -
-    T_s) + L max(w - w_s(T_s), 0))``, with R from the rated total cooling.
+    time that it is on. The cooling coil has a surface between air and water: ``(T_s - T_water) / R = m (1 - b) (c_p
+    (T - T_s) + L max(w - w_s(T_s), 0))``, with R from the rated total cooling.
     """
 
     label, device = "fan coil", "fan_coil"

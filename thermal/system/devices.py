@@ -76,8 +76,8 @@ def device_graph(building: Building) -> DeviceGraph:
     names, zones = [d.name for d in building.devices], building.zone_names
     air_handlers = tuple(d.name for d in building.devices if d.type == "ahu")
     serving, emitters = _by_floor(building, max(1, len(air_handlers))), dict[str, tuple[Device, ...]]()
-    supplies, draws = ({k for k, c in COMPONENTS.items() if any(p.quantity == "water" and p.supplies == s for p in c.ports)}
-                       for s in (True, False))  # fmt: skip
+    wet = {kind: [p.supplies for p in c.ports if p.quantity == "water"] for kind, c in COMPONENTS.items()}
+    supplies, draws = ({kind for kind, ports in wet.items() if side in ports} for side in (True, False))
     types, unused = [d.type for d in building.devices], dict[str, str]()
     source = next((kind for kind in types if kind in supplies - draws), BoilerLoop.device)
     water = (source, *(kind.device for kind in (StorageTank, MixingValve) if kind.device in types))
@@ -96,7 +96,8 @@ def device_graph(building: Building) -> DeviceGraph:
         elif issubclass(kind, Group):
             emitters[device.type] = (*emitters.get(device.type, ()), device)
         elif device.type not in (AirHandler.device, ChillerLoop.device, *water):
-            why = f"the hot water is from {source}" if device.type in supplies else "no rule connects it: pass the system"
+            supplied = f"the hot water is from {source}"
+            why = supplied if device.type in supplies else "no rule connects it: pass the system"
             unused[device.name] = f"{device.type}, {why}"
     heated = {d.zone for kind, found in emitters.items() for d in found if kind != Ventilators.device}
     has_air = bool({"vav", AirHandler.device} & set(types)) or not set(zones) <= heated

@@ -202,7 +202,8 @@ def _draws(part: Component, quantity: str) -> bool:
 
 def _water(part: Component) -> float:
     """Hot water through the open valves of a component [kg/s]."""
-    return float(np.sum(getattr(part.heating if isinstance(part, AirHandler) else part, "water_flow")))
+    drawing: Any = part.heating if isinstance(part, AirHandler) else part
+    return float(np.sum(drawing.water_flow))
 
 
 def _air_handler(flow: float, at: DesignConditions, density: float) -> AirHandler:
