@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from _component_models import (
     STEPS_PER_HOUR,
+    YEAR,
     Row,
     column,
     constant,
@@ -60,13 +61,13 @@ DRAW = 1.5e-4  # m3/s, from the tank
 TOWER = CoolingTower.sized(1.3 * COLD)
 
 
-def compared(folder: Path) -> list[Row]:
+def compared(folder: Path, last: tuple[int, int] = YEAR) -> list[Row]:
     """Run EnergyPlus' models and ours."""
-    table = run(_model(folder), folder)
+    table = run(_model(folder, last), folder)
     outdoor = column(table, "ENVIRONMENT", "Site Outdoor Air Drybulb Temperature") + FREEZING
     damp = column(table, "ENVIRONMENT", "Site Outdoor Air Humidity Ratio")
     now = Conditions(None, None, None, outdoor, damp)
-    loads = {name: np.repeat(values, STEPS_PER_HOUR) for name, values in _loads().items()}
+    loads = {name: np.repeat(values, STEPS_PER_HOUR)[: len(table)] for name, values in _loads().items()}
     rows = [*_heat_pumps(table, now, loads["heat"]), *_boiler(table, now, loads["heat"])]
     rows += [*_district(table, now, loads["heat"]), *_chiller(table, now, loads["cold"]), *_tank(table)]
     return rows
@@ -81,10 +82,10 @@ def _loads() -> dict[str, np.ndarray]:
     return {"heat": np.minimum(heat, HEAT), "cold": np.minimum(cold, 0.85 * COLD)}
 
 
-def _model(folder: Path) -> str:
+def _model(folder: Path, last: tuple[int, int]) -> str:
     """Write all plant components into one model."""
     loads = _loads()
-    parts = [head("plants")]
+    parts = [head("plants", last)]
     for name, values in loads.items():
         parts += [series(name, values if name == "heat" else -values, folder)]
         parts += [series(f"{name} flow", (values > 0.0) * 1.0, folder)]

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from _component_models import (
+    YEAR,
     Row,
     column,
     constant,
@@ -52,9 +53,9 @@ ONE = np.zeros(1, dtype=int)
 DEFROST = Defrost(278.15, input_share=1.0, pressure=SITE_PRESSURE)
 
 
-def compared(folder: Path) -> list[Row]:
+def compared(folder: Path, last: tuple[int, int] = YEAR) -> list[Row]:
     """Run EnergyPlus' models and ours."""
-    table = run(_model(), folder)
+    table = run(_model(last), folder)
     return [*_heater(table), *_fan_coil(table), *_unitary(table), *_ventilator(table)]
 
 
@@ -126,10 +127,10 @@ def _water(name: str, setpoint: float, coils: list[tuple[str, str]], kind: str) 
     ])  # fmt: skip
 
 
-def _model() -> str:
+def _model(last: tuple[int, int]) -> str:
     """Write all boxes into one model."""
     parts = [
-        head("zones"),
+        head("zones", last),
         idf("Material:NoMass", "insulation", "Rough", 2.2), idf("Material", "concrete", "Rough", 0.1, 1.7, 2300, 900),
         idf("Construction", "shell", "insulation", "concrete"), idf("Construction", "slab", "concrete"),
         constant("gains", 0.5), constant("activity", 120), constant("dual", 4), constant("cycling", 0),

@@ -102,7 +102,7 @@ def test_a_unit_heats_by_its_compressor_first() -> None:
     little, all_of_it = ran(units, cold, 0.2, 0.0), ran(units, cold, 1.0, 0.0)
     assert all_of_it.heating == pytest.approx(able + units.supplement)
     assert little.heating == pytest.approx(0.2 * all_of_it.heating) and (little.heating < able).all()
-    assert (little.electric_power - little.fan_power < 0.7 * little.heating).all()  # a COP above 1.4, by no resistance
+    assert (little.electric_power - little.fan_power < 0.9 * little.heating).all()  # less than by resistance
     full = ran(units, at(299.15, 308.15, 0.010), 0.0, 1.0)
     assert (full.heat < 0.0).all() and full.fan_power == pytest.approx(units.fan_power)
     power = (full.electric_power - full.fan_power) / (full.cooling + full.moisture)
