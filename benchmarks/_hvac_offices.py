@@ -153,7 +153,7 @@ def _medium_handler(reference: Reference, week: pd.DataFrame, k: int) -> AirHand
     sensible = reference.size(dx, "Design Size High Speed Rated Sensible Heat Ratio")
     # the coil's surface may be as cold as it needs: direct expansion has no water that bounds it
     pressure = float(_series(week, "ENVIRONMENT", "Site Outdoor Air Barometric Pressure").mean())
-    cooling = CoolingCoil(capacity, bypass=_bypass(capacity, volume, sensible), coldest=275.15, pressure=pressure)
+    cooling = CoolingCoil(capacity, bypass=bypass_factor(capacity, volume, sensible), coldest=275.15, pressure=pressure)
     heating = Heater(reference.size(f"VAV_{k}_HEATC", "Design Size Nominal Capacity"))
     fan = Fan(DENSITY * volume, 1109.648, efficiency=0.5915, air_density=DENSITY)
     return AirHandler(
@@ -216,7 +216,7 @@ def _coil(reference: Reference, name: str, air_flow: float) -> WaterCoil:
     return WaterCoil(overall * (1.0 + FILM_RATIO), overall * (1.0 + FILM_RATIO) / FILM_RATIO, air_flow, water)
 
 
-def _bypass(capacity: float, volume: float, sensible: float) -> float:
+def bypass_factor(capacity: float, volume: float, sensible: float) -> float:
     """Bypass factor of a coil with this rated capacity [W], air [m3/s] and sensible heat ratio [-]."""
     psychrolib.SetUnitSystem(psychrolib.SI)
     pressure = 101_325.0

@@ -63,31 +63,37 @@ def reference_weeks(name: str, outputs: Sequence[tuple[str, str]]) -> Reference:
     outputs : sequence of tuple of str
         Key and variable of each output; key ``*`` for all.
     """
-    try:
-        import pyenergyplus
-    except ImportError as error:
-        raise ReferenceRunError("EnergyPlus is not installed: pip install -e .[energyplus]") from error
-    data = Path(str(pyenergyplus.__file__)).parent / "data"
+    data = energyplus_data()
     with tempfile.TemporaryDirectory(prefix="energyplus_") as temporary:
         folder = Path(temporary)
         text = (data / "model" / name).read_text(encoding="latin-1")
         (folder / "in.idf").write_text(_rewritten(text, outputs), encoding="latin-1")
-        command = [
-            sys.executable,
-            __file__,
-            str(folder / "in.idf"),
-            str(data / "weather" / WEATHER),
-            str(folder / "out"),
-        ]
-        environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-        done = subprocess.run(command, env=environment, capture_output=True, text=True)
-        end = folder / "out" / "eplusout.end"
-        said = end.read_text(encoding="utf-8") if end.exists() else "no end file"
-        severe = _SEVERE.search(said)
-        if done.returncode != 0 or severe is None or int(severe[1]):
-            raise ReferenceRunError(f"{name}: EnergyPlus returned {done.returncode}: {said} {done.stderr[-1000:]}")
+        run_energyplus(folder / "in.idf", folder / "out")
         with closing(sqlite3.connect(folder / "out" / "eplusout.sql")) as database:
             return Reference(_weeks(database), _sizes(database))
+
+
+def energyplus_data() -> Path:
+    """Folder of EnergyPlus' models and weather."""
+    try:
+        import pyenergyplus
+    except ImportError as error:
+        raise ReferenceRunError("EnergyPlus is not installed: pip install -e .[energyplus]") from error
+    return Path(str(pyenergyplus.__file__)).parent / "data"
+
+
+def run_energyplus(model: Path, out: Path) -> None:
+    """Run a model in a process of its own with the weather of the reference."""
+    command = [sys.executable, __file__, str(model), str(energyplus_data() / "weather" / WEATHER), str(out)]
+    environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True)
+    end, errors = out / "eplusout.end", out / "eplusout.err"
+    said = end.read_text(encoding="utf-8") if end.exists() else "no end file"
+    severe = _SEVERE.search(said)
+    if done.returncode != 0 or severe is None or int(severe[1]):
+        lines = errors.read_text(encoding="utf-8").splitlines() if errors.exists() else [done.stderr[-1000:]]
+        worst = [line for line in lines if "Severe" in line or "Fatal" in line or "~~~" in line][:20]
+        raise ReferenceRunError("\n".join([f"{model}: EnergyPlus returned {done.returncode}: {said}", *worst]))
 
 
 def _rewritten(text: str, outputs: Sequence[tuple[str, str]]) -> str:

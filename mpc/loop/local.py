@@ -14,12 +14,31 @@ from typing import Any
 import numpy as np
 
 from thermal._types import FloatArray
+from thermal.components.terminals import Terminals
 from thermal.system.system import HvacSystem
 from thermal.units import AIR_HEAT_CAPACITY
 
 _FAR = 50.0  # K beyond the thermostat's ranges, where terminals are at their limits and q is a line
 _ENDLESS = 1e9  # K
+_USUAL = 293.15  # K
+_PER_FLOW = 1e4  # J/kg: air 10 K above the zone
 _FOLLOW = 0.5  # share of what the last step missed that is made up for in the next
+
+
+def most_heat(system: HvacSystem) -> FloatArray:
+    """Heat that the zones may get, about, shape (n_zone,) [W]: of their air, or else of what stands in them.
+
+    Parameters
+    ----------
+    system : HvacSystem
+        The plant.
+    """
+    heat = _PER_FLOW * system.by_zone(system.terminals.design_flow)
+    others = np.zeros(system.zone_count)
+    for group in system.groups.values():
+        likely = group.likely_heat(1.0, np.full(len(group), _USUAL))
+        others += np.bincount(group.zone, likely, system.zone_count)
+    return np.where(heat > 0.0, heat, np.maximum(others, 1.0))
 
 
 class LocalControl:
@@ -117,11 +136,12 @@ class LocalControl:
         flows = (warm, warm, least, least, least, cool, cool)
         discharge = (limit, limit, limit, air, air, air, air)
         heat = np.stack([
-            np.bincount(zone, AIR_HEAT_CAPACITY * flow * (leaving - end[zone]), system.zone_count)
+            system.by_zone(AIR_HEAT_CAPACITY * flow * (leaving - end[zone]))
             for flow, leaving, end in zip(flows, discharge, ends, strict=True)
         ])  # fmt: skip
-        for group in (g for g in system.groups.values() if g is not terminals):
-            for row, (call, end) in enumerate(zip((1.0, 1.0, min(first, 0.999)), ends, strict=False)):
+        calls = (1.0, 1.0, min(first, 0.999), 0.0, 0.0, -1.0, -1.0)
+        for group in (g for g in system.groups.values() if not isinstance(g, Terminals)):
+            for row, (call, end) in enumerate(zip(calls, ends, strict=True)):
                 likely = group.likely_heat(call, end[group.zone])
                 heat[row] += np.bincount(group.zone, likely, system.zone_count)
         start = ends - self._response * heat

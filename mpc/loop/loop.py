@@ -7,7 +7,7 @@ import numpy as np
 
 from mpc.loop.building import BuildingModel, zone_response
 from mpc.loop.history import PlantStep
-from mpc.loop.local import LocalControl
+from mpc.loop.local import LocalControl, most_heat
 from mpc.loop.operation import Operation
 from mpc.loop.schedule import Schedule
 from mpc.loop.signals import RADIANT, EffectSignals, sensor_offset
@@ -74,9 +74,8 @@ class PlantLoop:
         self._seconds, self._boundary = float(scenario.grid.step), boundary
         self._outdoor = [float(v) for v in scenario.outdoor]
         self._schedule = Schedule(operation, system, scenario.zones)
-        rated = system.by_zone(system.terminals.design_flow)
-        self._terminals = next(iter(system.of_kind(Terminals)))
-        self._local = LocalControl(system, zone_response(model, 1e4 * rated))
+        self._terminals = next(iter(system.of_kind(Terminals)), None)
+        self._local = LocalControl(system, zone_response(model, most_heat(system)))
         self._off = (False,) * len(system.air_handlers)
         signals = [signal.name for signal in model.network.signals]
         radiant = [f"{RADIANT}{zone}" for zone in scenario.zones]
@@ -151,7 +150,7 @@ class PlantLoop:
         set_back = self._schedule.set_back[k]
         self._state, done = self.hvac.step(self._state, conditions, actions, self._seconds, set_back)
         heat = self.hvac.heat(done)
-        terminals = done.results[self._terminals]
+        terminals = done.results[self._terminals] if self._terminals else done.terminals
         by_heaters = heat - self.hvac.system.by_zone(terminals.heat)
         signals = effects.at(k, terminals.airflow, heat, by_heaters)
         if self._radiant:

@@ -28,6 +28,7 @@ from thermal.case.building import Building, Device
 from thermal.case.case import Case
 from thermal.case.load import load_case
 from thermal.case.save import save_case
+from thermal.components.registry import COMPONENTS
 from thermal.effects.catalogue import chosen
 from thermal.effects.effect import Chosen
 from thermal.model.matrices import SymbolicModel
@@ -258,9 +259,11 @@ def equip(building: Building) -> tuple[Building, tuple[str, ...]]:
     """
     terminals = {z: [d for d in building.devices_of(z) if d.type == "vav"] for z in building.zone_names}
     spare = {d.name for found in terminals.values() for d in found[1:]}  # a plant is sized with one a zone
-    bare = [zone for zone, found in terminals.items() if not found]
     graph = device_graph(building)
-    names = {"ahu": "air handler", graph.water: graph.water.replace("_", " ")}
+    bare = [zone for zone, found in terminals.items() if not found and graph.has_air]
+    source = graph.water[0]
+    wet = graph.has_air or any(p.quantity == "water" for kind in graph.emitters for p in COMPONENTS[kind].ports)
+    names = ({"ahu": "air handler"} if graph.has_air else {}) | ({source: source.replace("_", " ")} if wet else {})
     lacking = [kind for kind in names if not any(d.type == kind for d in building.devices)]
     taken = {d.name for d in building.devices} | set(building.zone_names)
     wanted = [(f"VAV_{zone}", "vav", zone) for zone in bare] + [(kind.upper(), kind, None) for kind in lacking]

@@ -93,7 +93,7 @@ def scheduled_operation(
     scenario : Scenario
         Its comfort bands say when zones are occupied: where the band is at its narrowest.
     air_handlers : int
-        Number of air handlers, at least 1.
+        Number of air handlers; what has none, such as radiators, runs always, by its setpoints.
     lead_hours : float
         By how much plant and setpoints come before the occupied hours [h], 0 to 12.
     margin : float
@@ -114,9 +114,9 @@ def scheduled_operation(
     PlantError
         When a number is out of its range.
     """
-    if not (air_handlers >= 1 and 0.0 <= lead_hours <= 12.0 and margin >= 0.0):
+    if not (air_handlers >= 0 and 0.0 <= lead_hours <= 12.0 and margin >= 0.0):
         found = f"{air_handlers}, {lead_hours} h and {margin} K"
-        raise PlantError("operation", "an air handler or more, 0 to 12 h, a margin of 0 K or more", found)
+        raise PlantError("operation", "air handlers from 0 on, 0 to 12 h, a margin of 0 K or more", found)
     width = scenario.upper - scenario.lower
     occupied = width <= width.min(axis=0) + 1e-9
     early = occupied.copy()

@@ -97,7 +97,7 @@ class Schedule:
             1 or 0 for each air handler [-], and which cycle now.
         """
         scheduled = self._running[k]
-        if self._limit is None or min(scheduled) == 1.0:
+        if self._limit is None or min(scheduled, default=1.0) == 1.0:
             return scheduled, (False,) * len(scheduled)
         beyond = np.maximum(heating - zone, zone - cooling)
         if beyond[beyond.argmax()] <= 0.0:  # none has drifted at all
@@ -131,7 +131,7 @@ class Schedule:
             chosen = {name: value for name, value in given.items() if name not in self._given}
             fans, outdoor = self._switches
             chosen |= dict(zip(fans, runs, strict=True)) | dict.fromkeys(outdoor, ventilation)
-            chosen |= dict.fromkeys(self._water, max(runs))
+            chosen |= dict.fromkeys(self._water, max(runs, default=1.0))
             reach = [
                 run * math.sqrt(chosen.get(pressure, self._optional[pressure]) / self._optional[pressure])
                 for run, (_, pressure) in zip(runs, self._supply, strict=True)

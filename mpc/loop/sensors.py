@@ -43,12 +43,12 @@ class PlantDevices:
     @property
     def terminals(self) -> tuple[str, ...]:
         """Names of the terminals."""
-        return self.by_type["vav"]
+        return self.by_type.get("vav", ())
 
     @property
     def air_handlers(self) -> tuple[str, ...]:
         """Names of the air handlers."""
-        return self.by_type["ahu"]
+        return self.by_type.get("ahu", ())
 
     @property
     def chiller(self) -> str | None:
@@ -156,10 +156,10 @@ class Sensors:
         people = [f"{zone}/occupancy_count_sensor" for zone in scenario.zones] if counted else []
         self.layout = PointLayout((*self._points.columns, *meter, *weather, *people), building.location.timezone)
         self._chiller = chiller is not None
-        handlers, (group,) = system.of_kind(AirHandler), system.of_kind(Terminals)
-        self._meters = self._places(handlers, "electrical_power_sensor")
-        self._flow = self._places(system.entities(group), SUPPLY_FLOW)
-        self._discharge = self._places(system.entities(group), DISCHARGE_TEMPERATURE)
+        boxes = [entity for name in system.of_kind(Terminals) for entity in system.entities(name)]
+        self._meters = self._places(system.of_kind(AirHandler), "electrical_power_sensor")
+        self._flow = self._places(boxes, SUPPLY_FLOW)
+        self._discharge = self._places(boxes, DISCHARGE_TEMPERATURE)
         self._weather = scenario.weather.frame.to_numpy(dtype=float)
         self._noise = None if noise is None else NoiseSource(self.layout, noise)
 

@@ -50,7 +50,7 @@ def test_sizes_are_found_by_their_beginning(reference):
 
 def test_the_bypass_of_a_rated_coil(offices):
     # the Medium Office's first coil as EnergyPlus sizes it: 151,891 W at 6.822 m3/s, 73.66 % sensible
-    assert offices._bypass(151_891.45, 6.821876, 0.736564) == pytest.approx(0.0446, abs=1e-3)
+    assert offices.bypass_factor(151_891.45, 6.821876, 0.736564) == pytest.approx(0.0446, abs=1e-3)
 
 
 @pytest.mark.energyplus

@@ -11,7 +11,10 @@ from thermal.case.building import Building, Device
 from thermal.case.points import HEATING_POWER
 
 #: Devices whose heat is that of supply air, and so goes to the air for certain.
-_OF_AIR = frozenset({"vav", "fan_coil", "supply_air_terminal"})
+_OF_AIR = frozenset({"vav", "fan_coil", "supply_air_terminal", "unitary_heat_pump", "heat_recovery_ventilator"})
+
+#: What devices of these types give their heat by where a case does not say it.
+_BY_TYPE = {"floor_heating": "floor"}
 
 #: What plain heaters of which a case says nothing are taken for.
 Unknown = Literal["air", "radiator", "floor"]
@@ -70,7 +73,7 @@ def unknown_heaters(building: Building, columns: Container[str]) -> tuple[str, .
     columns
         Of the telemetry.
     """
-    unknown = (d.name for d in building.devices if is_heater(d) and d.emitter is None)
+    unknown = (d.name for d in building.devices if is_heater(d) and (d.emitter or _BY_TYPE.get(d.type)) is None)
     return tuple(name for name in unknown if f"{name}/{HEATING_POWER}" in columns)
 
 
@@ -86,7 +89,7 @@ def emitters_of(building: Building, unknown: Unknown = "air") -> tuple[Emitter, 
     """
     found: dict[tuple[str, str], list[int]] = {}
     for number, device in enumerate(building.devices):
-        kind = device.emitter or f"unknown_{unknown}"
+        kind = device.emitter or _BY_TYPE.get(device.type) or f"unknown_{unknown}"
         if is_heater(device) and not kind.endswith("air"):
             found.setdefault((str(device.zone), kind), []).append(number)
     made = []

@@ -20,7 +20,7 @@ from thermal.components.moist_air import USUAL_HUMIDITY
 from thermal.components.operations import Operations, Value
 from thermal.errors import ModelError
 
-Quantity = Literal["air", "water", "heat", "electricity", "fuel"]
+Quantity = Literal["air", "water", "chilled_water", "heat", "electricity", "fuel"]
 #: A component's function while it runs: yields the port that it waits for, returns its named results. One that waits
 #: for nobody may be a plain function that returns them.
 Run = Generator[str, Any, Any]
@@ -34,7 +34,7 @@ class Port(NamedTuple):
     ----------
     name : str
         Of the port. What leaves as heat, electricity or fuel stands under this name in the component's results.
-    quantity : {"air", "water", "heat", "electricity", "fuel"}
+    quantity : {"air", "water", "chilled_water", "heat", "electricity", "fuel"}
         What goes through it.
     unit : str
         Unit of the flow.
@@ -215,7 +215,7 @@ class Component:
     @property
     def connectors(self) -> tuple[Port, ...]:
         """Ports of air and water: each needs something that it is connected to."""
-        return tuple(port for port in self.ports if port.quantity in ("air", "water"))
+        return tuple(port for port in self.ports if port.quantity in ("air", "water", "chilled_water"))
 
     @classmethod
     def sized(cls, *design: Any, **options: Any) -> Any:
@@ -317,7 +317,7 @@ class Group(Component):
         Parameters
         ----------
         call : float
-            For heating [-].
+            For heating, 0 to 1; for cooling, -1 to 0 [-].
         zone : numpy.ndarray, shape (n_element,)
             Temperatures of their zones [K].
         """

@@ -2,11 +2,19 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Protocol
 
 from thermal.components.operations import Operations, Value
 from thermal.errors import ModelError
 
 _FREEZING = 273.15  # K
+
+
+class Curve(Protocol):
+    """A performance curve of two temperatures [degC], or of a share and a temperature."""
+
+    def __call__(self, ops: Operations, x: Value, y: Value) -> Value:
+        """Evaluate the curve at x and y."""
 
 
 @dataclass(frozen=True)
@@ -78,6 +86,48 @@ class Biquadratic:
         return c1 + x * (c2 + c3 * x + c6 * y) + y * (c4 + c5 * y)
 
 
+@dataclass(frozen=True)
+class OtherSide:
+    """A curve of the temperature on the other side alone, such as outdoors.
+
+    Parameters
+    ----------
+    polynomial : Polynomial
+        Of y [degC].
+    """
+
+    polynomial: Polynomial
+
+    def __call__(self, ops: Operations, x: Value, y: Value) -> Value:
+        """Evaluate the curve at y [degC]."""
+        return self.polynomial(ops, y)
+
+
+@dataclass(frozen=True)
+class LiftInput:
+    """Energy input ratio over the rated one of a machine whose COP is a polynomial of the lift x - y.
+
+    Parameters
+    ----------
+    cop : Polynomial
+        COP [-] of the lift [K].
+    rated_lift : float
+        Lift at which it is 1 [K].
+    """
+
+    cop: Polynomial
+    rated_lift: float
+
+    def __call__(self, ops: Operations, x: Value, y: Value) -> Value:
+        """Evaluate the curve at x and y [degC]."""
+        return self.rated_cop / self.cop(ops, x - y)
+
+    @cached_property
+    def rated_cop(self) -> float:
+        """COP at the rated lift [-]."""
+        return float(sum(c * self.rated_lift**k for k, c in enumerate(self.cop.coefficients)))
+
+
 def celsius(temperature: Value) -> Value:
     """Temperature as curves take it [degC], from [K]."""
     return temperature - _FREEZING
@@ -131,3 +181,31 @@ ORDINARY_BOILER = Biquadratic(
 CONSTANT_EFFICIENCY = Biquadratic(
     (1.0, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 1.0), (0.0, 100.0), _OFFICE + "Large Office: HeatSys1 Boiler"
 )
+_STAFFELL = "Staffell et al. (2012), A review of domestic heat pumps, Energy Environ. Sci. 5, 9291-9306: "
+#: Input over that at 35 degC of water and 7 degC of air [-] of air-source heat pumps, defrosting in it.
+AIR_SOURCE_INPUT = LiftInput(Polynomial((6.81, -0.121, 0.000630), 15.0, 60.0, _STAFFELL + "air source"), 28.0)
+#: Input over that at 35 degC of water and 0 degC of brine [-] of ground-source heat pumps.
+GROUND_SOURCE_INPUT = LiftInput(Polynomial((8.77, -0.150, 0.000734), 20.0, 60.0, _STAFFELL + "ground source"), 35.0)
+_SMALL_OFFICE = "ASHRAE 90.1 prototype, 2019, Small Office: "
+#: Heating capacity over that at 8.3 degC [-] of air-source direct expansion; y outdoor air [degC].
+DX_HEATING_CAPACITY = OtherSide(
+    Polynomial((0.758746, 0.027626, 0.000148716, 3.4992e-6), -20.0, 20.0, _SMALL_OFFICE + "HPACHeatCapFT")
+)
+#: Energy input ratio of heating over that at 8.3 degC [-] of the same coil.
+DX_HEATING_INPUT = OtherSide(
+    Polynomial((1.19248, -0.0300438, 0.00103745, -2.3328e-5), -20.0, 20.0, _SMALL_OFFICE + "HPACHeatEIRFT")
+)
+#: The same at any temperature: capacity of a machine that nothing more is known of, such as one on brine.
+CONSTANT = Biquadratic((1.0, 0.0, 0.0, 0.0, 0.0, 0.0), (-50.0, 100.0), (-50.0, 100.0), "definition")
+_WATER_COOLED = "ASHRAE 90.1 prototype, 2019, Large Office: WC_PD_2004_"
+#: Capacity over the rated one [-] of a water-cooled chiller with positive displacement; x chilled water, y water that
+#: enters the condenser [degC].
+WATER_COOLED_CAPACITY = Biquadratic(
+    (0.9061150, 0.0292277, -0.0003647, -0.0009709, -0.0000905, 0.0002527), _CHILLED, (17.78, 46.11),
+    _WATER_COOLED + "CAPFT",
+)  # fmt: skip
+#: Energy input ratio over the rated one [-] of the same chiller.
+WATER_COOLED_INPUT = Biquadratic(
+    (0.3617105, -0.0229833, 0.0009519, 0.0131889, 0.0003752, -0.0007059), _CHILLED, (17.78, 46.11),
+    _WATER_COOLED + "EIRFT",
+)  # fmt: skip

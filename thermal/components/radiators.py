@@ -1,10 +1,10 @@
-"""Radiators on the hot-water loop, all radiators of a building at once."""
+"""Radiators and heated floors on the hot-water loop, all of a building at once."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, NamedTuple
+from typing import Annotated, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -39,16 +39,16 @@ class RadiatorStep(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Radiators(Group):
-    """Radiators with valves that open with the thermostat's call for heating.
+class WaterEmitters(Group):
+    """What gives heat of hot water to zones without a fan, by valves that open with the thermostat's call for heating.
 
     Parameters
     ----------
-    nominal_heat : float or numpy.ndarray, shape (n_radiator,)
+    nominal_heat : float or numpy.ndarray, shape (n_emitter,)
         Heat at nominal temperatures [W], positive.
-    zone : numpy.ndarray of int, shape (n_radiator,)
+    zone : numpy.ndarray of int, shape (n_emitter,)
         Position of the zone that each stands in.
-    exponent : float or numpy.ndarray, shape (n_radiator,)
+    exponent : float or numpy.ndarray, shape (n_emitter,)
         Exponent of the overtemperature [-], 1.05 to 1.6. The default is a panel radiator's (EN 442-2: 1.2 to 1.4).
     supply_temperature, return_temperature, room_temperature : float
         Nominal temperatures [K]; the defaults are EN 442's 75, 65 and 20 degC.
@@ -67,7 +67,6 @@ class Radiators(Group):
     logarithmic mean, scales with the overtemperatures to the power n, and no water leaves colder than the zone.
     """
 
-    label, device = "radiator", "radiator"
     ports = (
         Port("hot_water", "water", "kg/s"), Port("heat", "heat", "W", "each"),
         Port("radiant_heat", "heat", "W", "each"),
@@ -86,17 +85,17 @@ class Radiators(Group):
         super().__post_init__()
         if not self.room_temperature < self.return_temperature < self.supply_temperature:
             found = f"{self.room_temperature:g}, {self.return_temperature:g} and {self.supply_temperature:g} K"
-            raise ModelError("Radiators: nominal temperatures", "room < return < supply", found)
+            raise ModelError(f"{type(self).__name__}: nominal temperatures", "room < return < supply", found)
 
     @classmethod
-    def sized(cls, heat: ArrayLike, zone: IndexArray) -> Radiators:
-        """Size radiators for the heat that they are to bring at nominal temperatures.
+    def sized(cls, heat: ArrayLike, zone: IndexArray) -> Self:
+        """Size emitters for the heat that they are to bring at nominal temperatures.
 
         Parameters
         ----------
-        heat : array_like, shape (n_radiator,)
-            Heat [W]; a radiator for nothing gets a watt.
-        zone : numpy.ndarray of int, shape (n_radiator,)
+        heat : array_like, shape (n_emitter,)
+            Heat [W]; one for nothing gets a watt.
+        zone : numpy.ndarray of int, shape (n_emitter,)
             Positions of the zones.
         """
         return cls(np.maximum(np.asarray(heat, dtype=float), 1.0), zone)
@@ -134,12 +133,12 @@ class Radiators(Group):
         Parameters
         ----------
         call : float
-            For heating [-].
-        zone : numpy.ndarray, shape (n_radiator,)
+            For heating; none where it is negative, for cooling [-].
+        zone : numpy.ndarray, shape (n_emitter,)
             Temperatures of their zones [K].
         """
         over = np.maximum(self.supply_temperature - zone, _LEAST)
-        return np.asarray(self.emitted(call * self.water_flow, over))
+        return np.asarray(self.emitted(max(call, 0.0) * self.water_flow, over))
 
     def run(self, ops: Operations, given: Given) -> Run:
         """Open valves by the calls, and bring the water's heat into the zones.
@@ -175,3 +174,35 @@ class Radiators(Group):
             What `run` returned.
         """
         return [done.valve_flow, done.heat]
+
+
+@dataclass(frozen=True, eq=False)
+class Radiators(WaterEmitters):
+    """Radiators: `WaterEmitters` with EN 442's nominal temperatures."""
+
+    label, device = "radiator", "radiator"
+
+
+@dataclass(frozen=True, eq=False)
+class HeatedFloors(WaterEmitters):
+    """Floors, or ceilings, with pipes: their heat goes into the layer of the building that the pipes are in.
+
+    Parameters
+    ----------
+    nominal_heat, zone, exponent, supply_temperature, return_temperature, room_temperature, radiant_share
+        As in `WaterEmitters`. The exponent is that of EN 1264-2's basic characteristic, ``q = 8.92 (T_floor -
+        T_room)^1.1``; nominal temperatures are usual ones of floors, 35, 30 and 20 degC. Nothing radiates past the
+        layer: what the floor gives to the room is the building's.
+
+    Notes
+    -----
+    The water's overtemperature is over the zone's air, as EN 1264 has it, and not over the layer: exact in the steady
+    state; a layer that is still cold takes up a little more, and one still warm a little less than this gives.
+    """
+
+    label, device = "heated floor", "floor_heating"
+
+    exponent: Annotated[FloatArray | float, Range("-", 1.05, 1.6)] = 1.1
+    supply_temperature: Annotated[float, Range("K", 293.15, 373.15)] = 308.15
+    return_temperature: Annotated[float, Range("K", 293.15, 373.15)] = 303.15
+    radiant_share: Annotated[float, Range("-", 0.0, 1.0)] = 0.0

@@ -253,8 +253,9 @@ def replay_loop(
         zip(load.tolist(), setpoint.tolist(), flow.tolist(), power.tolist(), strict=True)
     ):
         drawn, goal = WaterDrawn(0.0, -taken, through), loop.goal(ops, water, target, step)
-        end = loop.heat(ops, water, goal, float(through > 0.0), drawn, pump.heat_to_water * pumped, room, step)
+        most = loop.capacity * float(through > 0.0)
+        end = loop.heat(ops, water, goal, most, drawn, pump.heat_to_water * pumped, room, step)
         back = loop.returning(end, through)
-        rows.append((end.water, back, end.boiler, loop.fuel(ops, end.boiler, back), power[k]))
+        rows.append((end.water, back, end.produced, loop.fuel(ops, end.produced, back), power[k]))
         water = end.water
     return LoopReplay(*np.array(rows).T)

@@ -7,9 +7,13 @@ import numpy as np
 from thermal.case.building import Building, Device, FloorPlans
 from thermal.components.air_handler import AirHandler
 from thermal.components.boiler_loop import BoilerLoop
+from thermal.components.chiller_loop import ChillerLoop
 from thermal.components.component import Group, IndexArray
+from thermal.components.mixing_valve import MixingValve
 from thermal.components.registry import COMPONENTS
+from thermal.components.storage_tank import StorageTank
 from thermal.components.terminals import Terminals
+from thermal.components.ventilators import Ventilators
 from thermal.errors import ModelError
 
 _METERS = ("chiller",)  # devices that are read, and are parts of others' models
@@ -27,8 +31,13 @@ class DeviceGraph:
         Position of the air handler that feeds each zone.
     emitters : dict of str to tuple of Device
         Further devices in zones, by type.
-    water : str
-        Type of what supplies hot water: of the first device that does, else ``boiler``.
+    water : tuple of str
+        Types of what stands between heat and those that draw hot water, from what makes it on: of the first device that
+        does, else ``boiler``; a tank; a mixing valve, which feeds heated floors only.
+    chills : bool
+        Whether something makes chilled water.
+    has_air : bool
+        Whether it has terminals and air handlers, its own or, where some zone has nothing that heats it, assumed ones.
     unused : dict of str to str
         Devices that a plant made of the graph leaves out, each with the reason.
     """
@@ -36,7 +45,9 @@ class DeviceGraph:
     air_handlers: tuple[str, ...]
     serving: IndexArray
     emitters: dict[str, tuple[Device, ...]]
-    water: str
+    water: tuple[str, ...]
+    chills: bool
+    has_air: bool
     unused: dict[str, str]
 
 
@@ -65,8 +76,11 @@ def device_graph(building: Building) -> DeviceGraph:
     names, zones = [d.name for d in building.devices], building.zone_names
     air_handlers = tuple(d.name for d in building.devices if d.type == "ahu")
     serving, emitters = _by_floor(building, max(1, len(air_handlers))), dict[str, tuple[Device, ...]]()
-    heats = {kind for kind, c in COMPONENTS.items() if any(p.quantity == "water" and p.supplies for p in c.ports)}
-    water, unused = next((d.type for d in building.devices if d.type in heats), BoilerLoop.device), dict[str, str]()
+    wet = {kind: [p.supplies for p in c.ports if p.quantity == "water"] for kind, c in COMPONENTS.items()}
+    supplies, draws = ({kind for kind, ports in wet.items() if side in ports} for side in (True, False))
+    types, unused = [d.type for d in building.devices], dict[str, str]()
+    source = next((kind for kind in types if kind in supplies - draws), BoilerLoop.device)
+    water = (source, *(kind.device for kind in (StorageTank, MixingValve) if kind.device in types))
     for device in building.devices:
         feeding = getattr(device, "fed_by", ())
         for name in feeding:
@@ -81,10 +95,13 @@ def device_graph(building: Building) -> DeviceGraph:
                 serving[zones.index(str(device.zone))] = air_handlers.index(name)
         elif issubclass(kind, Group):
             emitters[device.type] = (*emitters.get(device.type, ()), device)
-        elif device.type not in (AirHandler.device, water):
-            why = f"the hot water is from {water}" if device.type in heats else "no rule connects it: pass the system"
+        elif device.type not in (AirHandler.device, ChillerLoop.device, *water):
+            supplied = f"the hot water is from {source}"
+            why = supplied if device.type in supplies else "no rule connects it: pass the system"
             unused[device.name] = f"{device.type}, {why}"
-    return DeviceGraph(air_handlers, serving, emitters, water, unused)
+    heated = {d.zone for kind, found in emitters.items() for d in found if kind != Ventilators.device}
+    has_air = bool({"vav", AirHandler.device} & set(types)) or not set(zones) <= heated
+    return DeviceGraph(air_handlers, serving, emitters, water, ChillerLoop.device in types, has_air, unused)
 
 
 def _by_floor(building: Building, count: int) -> IndexArray:

@@ -1,6 +1,8 @@
 """Sizes of a building's plant from its loads: terminals, air handlers, boiler, as a designer takes them."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -8,19 +10,24 @@ from thermal._types import FloatArray
 from thermal.case.building import Building, FloorPlans, ZoneTable
 from thermal.case.plan import zone_floor_areas
 from thermal.components.air_handler import AirHandler
-from thermal.components.component import Group
+from thermal.components.chiller_loop import ChillerLoop
+from thermal.components.component import Component
 from thermal.components.cooling_coil import CoolingCoil
 from thermal.components.fan import Fan
+from thermal.components.mixing_valve import MixingValve
+from thermal.components.radiators import HeatedFloors
 from thermal.components.registry import COMPONENTS
 from thermal.components.terminals import Terminals
 from thermal.components.thermostat import Thermostat
 from thermal.components.water_coil import WaterCoil
+from thermal.components.zone_units import FanCoils, ZoneUnits
 from thermal.errors import ModelError
 from thermal.model.matrices import SymbolicModel
 from thermal.model.step import Stepper
 from thermal.network.build import build_network
-from thermal.system.devices import device_graph
-from thermal.system.system import HvacSystem, vav_system
+from thermal.system.connections import Connection
+from thermal.system.devices import DeviceGraph, device_graph
+from thermal.system.system import HvacSystem
 from thermal.units import AIR_HEAT_CAPACITY, air_density
 
 _LONG_RUN = 1e8  # s: one implicit step to the steady state
@@ -81,8 +88,9 @@ def size_system(
 ) -> HvacSystem:
     """Size the plant of a building: a terminal with reheat a zone, an air handler a device of type ``ahu``, one boiler.
 
-    Other devices in zones, such as radiators, get the heat that their zones lose, by the `sized` of their class; what
-    supplies the hot water is of the class of the first device that does, or a boiler.
+    Other devices in zones, such as radiators or fan coils, get the loads of their zones, by the `sized` of their class;
+    a building in which they are in every zone, with no terminal and no air handler, has none. What makes the hot water
+    is of the class of the first device that does, or a boiler; a tank stands between, and a mixing valve before floors.
     Heating loads are those of the steady state in the winter, from the building's model with its starting parameters;
     cooling flows are those of gains, sun and warmth outdoors. Which air handler feeds which zone says
     `thermal.system.devices.device_graph`.
@@ -121,25 +129,81 @@ def size_system(
     flow = np.maximum(flow, loss / (AIR_HEAT_CAPACITY * rise * _HEATING_SHARE))
     reheat = loss + AIR_HEAT_CAPACITY * _HEATING_SHARE * flow * (at.heating - at.supply_air)
     graph = device_graph(building)
-    serving = graph.serving
-    terminals = Terminals.sized(
-        flow, reheat, air_handler=serving, water_temperature=at.supply_water, supply_temperature=at.supply_air
-    )
-    density = air_density(building.location.elevation)
-    handlers = tuple(_air_handler(float(flow[serving == k].sum()), at, density) for k in range(serving.max() + 1))
-    coils = [h.heating for h in handlers if isinstance(h.heating, WaterCoil)]
-    emitters: dict[str, Group] = {}  # those of a zone share the heat that it loses
-    for kind, devices in graph.emitters.items():
+    parts: dict[str, Component] = {}
+    for kind, devices in graph.emitters.items():  # those of a zone share the heat that it loses, and its cooling
         zone = np.array([building.zone_names.index(str(device.zone)) for device in devices], dtype=np.intp)
-        emitters[kind] = COMPONENTS[kind].sized(loss[zone] / np.bincount(zone)[zone], zone)
-    wet = [*coils, *emitters.values()]
-    water_flow = float(terminals.water_flow.sum() + sum(np.sum(getattr(part, "water_flow", 0.0)) for part in wet))
-    capacity = float(reheat.sum()) + sum(c.air_flow * AIR_HEAT_CAPACITY * 12.0 for c in coils)
-    system = vav_system(handlers, COMPONENTS[graph.water].sized(capacity, water_flow), terminals, thermostat)
-    for kind, group in emitters.items():
-        suppliers = {port.name: system.water_suppliers for port in group.connectors if port.quantity == "water"}
-        system = system.with_component(kind.upper(), group, **suppliers)
-    return system
+        share = 1.0 / np.bincount(zone)[zone]
+        heat, cooling = (load[zone] * share for load in (loss, summer))
+        given: dict[str, Any] = {"cooling": cooling} if issubclass(COMPONENTS[kind], ZoneUnits) else {}
+        parts[kind.upper()] = COMPONENTS[kind].sized(heat, zone, **given)
+        if isinstance(group := parts[kind.upper()], FanCoils) and not graph.chills:
+            parts[kind.upper()] = replace(group, cools=False)
+    capacity = float(loss.sum())
+    if graph.has_air:
+        terminals = Terminals.sized(
+            flow, reheat, air_handler=graph.serving, water_temperature=at.supply_water, supply_temperature=at.supply_air
+        )
+        density = air_density(building.location.elevation)
+        numbers = range(graph.serving.max() + 1)
+        handlers = {f"AHU_{k}": _air_handler(float(flow[graph.serving == k].sum()), at, density) for k in numbers}
+        coils = [h.heating for h in handlers.values() if isinstance(h.heating, WaterCoil)]
+        capacity = float(reheat.sum()) + sum(c.air_flow * AIR_HEAT_CAPACITY * 12.0 for c in coils)
+        parts = {"VAV": terminals, **handlers, **parts}
+    return joined(parts, graph, capacity, float(summer.sum()), thermostat)
+
+
+def joined(
+    parts: Mapping[str, Component], graph: DeviceGraph, capacity: float, cooling: float, thermostat: Thermostat | None
+) -> HvacSystem:
+    """Join what stands in zones and air handlers with what makes water for them, sized for it.
+
+    Parameters
+    ----------
+    parts : mapping of str to Component
+        Terminals, air handlers and groups, by name.
+    graph : DeviceGraph
+        Of the building's devices.
+    capacity, cooling : float
+        Largest heat and cold of the water [W].
+    thermostat : Thermostat or None
+        Of every zone.
+    """
+    handlers = tuple(name for name, part in parts.items() if isinstance(part, AirHandler))
+    links = [Connection("VAV", "supply_air", handlers)] if handlers else []
+    wet = {name: part for name, part in parts.items() if _draws(part, "water")}
+    cold = {name: part for name, part in parts.items() if _draws(part, "chilled_water")}
+    made: dict[str, Component] = {}
+    floors = [name for name in wet if isinstance(parts[name], HeatedFloors)]
+    chain = [kind for kind in graph.water if kind != MixingValve.device or floors]
+    flow = float(sum(_water(part) for part in wet.values()))
+    before = ""
+    for kind in chain if wet else ():
+        valve = kind == MixingValve.device
+        through = sum(_water(parts[name]) for name in floors) if valve else flow
+        made[kind.upper()] = part = COMPONENTS[kind].sized(capacity, float(through))
+        links += [Connection(kind.upper(), port.name, (before,)) for port in part.connectors if not port.supplies]
+        before = before if valve else kind.upper()
+    valve_name = MixingValve.device.upper()
+    for name in wet:
+        supplier = valve_name if name in floors and valve_name in made else before
+        links.append(Connection(name, "hot_water", (supplier,)))
+    if cold:
+        chiller, through = ChillerLoop.device.upper(), sum(np.sum(part.chilled_flow) for part in cold.values())
+        made[chiller] = ChillerLoop.sized(cooling, float(through))
+        links += [Connection(name, "chilled_water", (chiller,)) for name in cold]
+    return HvacSystem({**parts, **made}, tuple(links), thermostat or Thermostat())
+
+
+def _draws(part: Component, quantity: str) -> bool:
+    """Whether a component draws water of a kind."""
+    coil = isinstance(part, AirHandler) and not isinstance(part.heating, WaterCoil)
+    return not coil and any(p.quantity == quantity and not p.supplies for p in part.connectors)
+
+
+def _water(part: Component) -> float:
+    """Hot water through the open valves of a component [kg/s]."""
+    drawing: Any = part.heating if isinstance(part, AirHandler) else part
+    return float(np.sum(drawing.water_flow))
 
 
 def _air_handler(flow: float, at: DesignConditions, density: float) -> AirHandler:

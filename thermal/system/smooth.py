@@ -142,11 +142,13 @@ class SmoothHvac:
         decided = {p: sizes[p] for p, a in kinds.items() if a.usual and a.default is None}
         held = {p: sizes[p] for p, a in kinds.items() if a.usual and a.default is not None and pressures}
         self.inputs = _slices(dict.fromkeys(system.states, 1) | decided | held | (zones if setpoints else {}))
-        others = {"outdoor_temperature": 1, "outdoor_humidity": 1, "return_humidity": self.n_air_handler,
+        others = {"outdoor_temperature": 1, "outdoor_humidity": 1, "return_humidity": max(self.n_air_handler, 1),
                   "room_temperature": 1, "seconds": 1}  # fmt: skip
         switches = {p: sizes[p] for p, a in kinds.items() if not a.usual}
         self.exogenous = _slices(zones | others | switches)
-        self.n_input, self.n_exogenous = (max(s.stop for s in d.values()) for d in (self.inputs, self.exogenous))
+        self.n_input, self.n_exogenous = (
+            max((s.stop for s in d.values()), default=0) for d in (self.inputs, self.exogenous)
+        )
         symbols = [
             casadi.SX.sym(*row)
             for row in (("zone", self.n_zone), ("inputs", self.n_input), ("exogenous", self.n_exogenous))

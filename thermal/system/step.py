@@ -3,10 +3,11 @@
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from thermal.components.air_handler import AirHandlerStep
 from thermal.components.operations import Value
 from thermal.components.terminals import TerminalStep
-from thermal.errors import ModelError
 
 
 class HvacStep(NamedTuple):
@@ -34,11 +35,11 @@ class HvacStep(NamedTuple):
 
     @property
     def terminals(self) -> TerminalStep:
-        """What the terminals did."""
+        """What the terminals did; of a system without air, nothing."""
         for result in self.results.values():
             if type(result) is TerminalStep:
                 return result
-        raise ModelError("HvacStep", "terminals", ", ".join(self.results), "results has all components by name")
+        return TerminalStep(*np.zeros((6, 0)))
 
     @property
     def supply_temperature(self) -> tuple[Value, ...]:

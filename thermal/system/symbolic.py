@@ -49,7 +49,8 @@ def hvac_function(system: HvacSystem, width: float = 0.02) -> Any:
     -------
     casadi.Function
         Of SX. Inputs by name: the states, such as ``BOILER_supply_water_temperature`` [K]; the fields of `Conditions`,
-        zones of shape (n_zone,), ``return_humidity`` of shape (n_air_handler,); the actuators by point, such as
+        zones of shape (n_zone,), ``return_humidity`` of shape (n_air_handler,), of one
+        for a system without air; the actuators by point, such as
         ``supply_air_temperature_setpoint`` [K], (n_air_handler,); ``seconds`` [s]. Outputs: the states at the end, such
         as ``BOILER_supply_water_temperature_end``; ``heat`` [W], (n_zone,); ``electric_power``, ``fuel_power`` [W];
         ``supply_temperature`` [K], (n_air_handler,); and what groups and loop did, such as ``VAV_airflow`` [kg/s],
@@ -72,7 +73,7 @@ def hvac_function(system: HvacSystem, width: float = 0.02) -> Any:
     >>> hvac_function(system).name_out()[:2]
     ['BOILER_supply_water_temperature_end', 'heat']
     """
-    ops, n, n_air = CasadiOperations(width), system.zone_count, len(system.air_handlers)
+    ops, n, n_air = CasadiOperations(width), system.zone_count, max(len(system.air_handlers), 1)
     sizes = dict.fromkeys(system.states, 1) | dict.fromkeys(Conditions._fields, 1)
     sizes |= dict.fromkeys(Conditions._fields[:3], n) | {"return_humidity": n_air}
     sizes |= {point: len(keys) for point, keys in system.by_point.items()} | {"seconds": 1}

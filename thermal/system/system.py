@@ -113,8 +113,8 @@ class HvacSystem:
 
     @cached_property
     def terminals(self) -> Terminals:
-        """The VAV terminals."""
-        return self.only(Terminals)
+        """The VAV terminals; of a system without air, a group of none."""
+        return self.only(Terminals) if self.of_kind(Terminals) else Terminals.sized([], [])
 
     @cached_property
     def zone_count(self) -> int:

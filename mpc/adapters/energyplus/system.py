@@ -134,13 +134,14 @@ def _cooling(source: EnergyPlusBuilding, loop: AirLoop) -> CoolingCoil | None:
 
 
 def _loop(source: EnergyPlusBuilding, price_ratio: float) -> BoilerLoop:
+    bare = {"standing_conductance": 0.0, "pipe_conductance": 0.0, "fastest_rise": 1.0}
     if not source.layout.water_loops:
         flow = float(_terminals(source, 1.0).water_flow.sum())
         pump = Pump(flow, 5_000.0, 1_000.0, 0.95, 0.01, 0.0)
         # heat per "fuel" is the ratio, which is below what a boiler's efficiency may be: its curve has the rest
         efficiency = max(price_ratio, 0.5)
         curve = Biquadratic((price_ratio / efficiency, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 1.0), (0.0, 100.0), "price")
-        return BoilerLoop(1e7, pump, efficiency, curve, 0.0, 0.0, 1e-3, 1.0)
+        return BoilerLoop(1e7, pump, efficiency, curve, water_volume=1e-3, **bare)
     loop = source.layout.water_loops[0]
     boilers = [source.source.find(kind, name) for kind, name in loop.boilers]
     capacity = sum(source.size(name, "Design Size Nominal Capacity") for _, name in loop.boilers)
@@ -149,6 +150,6 @@ def _loop(source: EnergyPlusBuilding, price_ratio: float) -> BoilerLoop:
     head = float(source.source.find(*loop.pumps[0]).get("design_pump_head", 179_352.0))
     pump = Pump(flow, head, head, head * flow / _WATER / power, 0.01)
     return BoilerLoop(
-        capacity, pump, float(boilers[0]["nominal_thermal_efficiency"]), CONSTANT_EFFICIENCY, 0.0, 0.0,
-        source.size(loop.name, "Plant Loop Volume"), 1.0,
+        capacity, pump, float(boilers[0]["nominal_thermal_efficiency"]), CONSTANT_EFFICIENCY,
+        water_volume=source.size(loop.name, "Plant Loop Volume"), **bare,
     )  # fmt: skip

@@ -27,7 +27,7 @@ def test_supply_setpoints_come_first_and_are_required() -> None:
     assert [a.name for a in ACTUATORS.values() if a.required] == [AIR, WATER]
     assert (ACTUATORS[AIR].lowest, ACTUATORS[WATER].highest) == (285.0, 355.0)  # the paper's simulator
     assert {a.unit for a in ACTUATORS.values()} == {"K", "Pa"}
-    assert len(ACTUATORS) == len(ACTION_LIMITS)
+    assert {name.rpartition("/")[2] for name in ACTUATORS} <= set(ACTION_LIMITS)
 
 
 def test_what_is_fine_passes_as_floats() -> None:

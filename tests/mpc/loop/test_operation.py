@@ -31,7 +31,7 @@ def test_setpoints_meet_at_most_in_the_middle_of_the_band(scenario: Callable[...
     np.testing.assert_allclose(plan.heating[100], plan.cooling[100])
 
 
-@pytest.mark.parametrize("options", [{"lead_hours": 13.0}, {"margin": -0.1}, {"air_handlers": 0}])
+@pytest.mark.parametrize("options", [{"lead_hours": 13.0}, {"margin": -0.1}, {"air_handlers": -1}])
 def test_numbers_out_of_range_are_refused(scenario: Callable[..., Scenario], options: dict[str, float]) -> None:
     with pytest.raises(PlantError, match="operation"):
         scheduled_operation(scenario(), **options)  # type: ignore[arg-type]

@@ -15,7 +15,7 @@ LOOP = BoilerLoop(100_000.0, Pump(3.0), water_volume=0.5)
 
 def heat(loop=LOOP, before=330.0, setpoint=330.0, running=1.0, conductance=500.0, source=140_000.0, step=300.0):
     goal = loop.goal(OPS, before, setpoint, step)
-    return loop.heat(OPS, before, goal, running, WaterDrawn(conductance, source, 0.0), 0.0, 293.15, step)
+    return loop.heat(OPS, before, goal, running * loop.capacity, WaterDrawn(conductance, source, 0.0), 0.0, 293.15, step)
 
 
 def test_pump_power_by_hand():
@@ -34,7 +34,7 @@ def test_pump_power_grows_with_flow_and_pressure(flow, pressure):
 def test_the_setpoint_is_held_within_the_capacity():
     end = heat()
     assert end.water == pytest.approx(330.0)
-    assert end.boiler == pytest.approx(500.0 * 330.0 - 140_000.0 + 50.0 * (330.0 - 293.15))
+    assert end.produced == pytest.approx(500.0 * 330.0 - 140_000.0 + 50.0 * (330.0 - 293.15))
 
 
 @given(
@@ -43,9 +43,9 @@ def test_the_setpoint_is_held_within_the_capacity():
 )  # fmt: skip
 def test_the_loop_balances_and_stays_within_what_it_meets(before, setpoint, conductance, air, running, step):
     end = heat(LOOP, before, setpoint, running, conductance, conductance * air, step)
-    residual = end.boiler - end.load - end.loss - end.storage
+    residual = end.produced - end.load - end.loss - end.storage
     assert abs(residual) <= 1e-9 * (abs(end.load) + abs(end.storage) + 1e5)
-    assert 0.0 <= end.boiler <= 100_000.0
+    assert 0.0 <= end.produced <= 100_000.0
     assert min(before, air, 293.15) - 1e-6 <= end.water <= max(before, setpoint, air, 293.15) + 1e-6
 
 

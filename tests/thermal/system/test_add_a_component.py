@@ -72,17 +72,17 @@ def test_a_type_of_two_classes_is_refused(page: dict[str, Any]) -> None:
 
 def test_a_heat_pump_supplies_the_water_of_plant_predictor_and_points(page: dict[str, Any]) -> None:
     system, conditions, step = page["warm"], page["conditions"], page["warmed"]
-    assert system.water_suppliers == ("HEAT_PUMP",) and list(system.states) == ["HEAT_PUMP/supply_water_temperature"]
+    assert system.water_suppliers == ("CARNOT_HEAT_PUMP",) and list(system.states) == ["CARNOT_HEAT_PUMP/supply_water_temperature"]
     known = system.defaults | page["setpoints"]
     found = hvac_function(system, 0.0)(
-        HEAT_PUMP_supply_water_temperature=318.0, seconds=300.0, **conditions._asdict(),
+        CARNOT_HEAT_PUMP_supply_water_temperature=318.0, seconds=300.0, **conditions._asdict(),
         **{point: [known[key] for key in keys] for point, keys in system.by_point.items()},
     )  # fmt: skip
     assert np.allclose(np.array(found["heat"]).ravel(), page["pump_plant"].heat(step))
-    assert float(found["HEAT_PUMP_supply_water_temperature_end"]) == pytest.approx(page["after"].values[0])
+    assert float(found["CARNOT_HEAT_PUMP_supply_water_temperature_end"]) == pytest.approx(page["after"].values[0])
     points = HvacPoints(system)
     read = dict(zip(points.columns, points.read(conditions, page["setpoints"], step), strict=True))
-    assert read["HEAT_PUMP/electrical_power_sensor"] == pytest.approx(step.results["HEAT_PUMP"].electric_power)
+    assert read["CARNOT_HEAT_PUMP/electrical_power_sensor"] == pytest.approx(step.results["CARNOT_HEAT_PUMP"].electric_power)
 
 
 def test_derivatives_of_a_heat_pump_are_those_of_finite_differences(page: dict[str, Any]) -> None:
@@ -113,24 +113,24 @@ def test_derivatives_of_a_heat_pump_are_those_of_finite_differences(page: dict[s
 
 
 def test_two_of_a_kind_keep_their_own_states_and_a_port_has_one_supplier(page: dict[str, Any]) -> None:
-    radiators, second = Radiators.sized([800.0], np.array([1])), page["HeatPump"](1e4, tank=1e6)
+    radiators, second = Radiators.sized([800.0], np.array([1])), page["CarnotHeatPump"](1e4, tank=1e6)
     warm = page["warm"]
     with pytest.raises(ModelError, match="SECOND: port 'hot_water'.*expected a connection for its water, found none"):
         warm.with_component("SECOND", second)
     with pytest.raises(ModelError, match="RAD: port 'hot_water'.*expected one connection for its water, found none"):
         warm.with_component("RAD", radiators)
-    with pytest.raises(ModelError, match="having: expected a component.*'HEAT_PUMP'"):
-        warm.having(HEAT_PUMPS=second)
-    joined = warm.with_component("RAD", radiators, hot_water="HEAT_PUMP")
+    with pytest.raises(ModelError, match="having: expected a component.*'CARNOT_HEAT_PUMP'"):
+        warm.having(CARNOT_HEAT_PUMPS=second)
+    joined = warm.with_component("RAD", radiators, hot_water="CARNOT_HEAT_PUMP")
     both = joined.with_component("SECOND", second, feeds=("RAD",))
     with pytest.raises(ModelError, match="RAD: port 'hot_water'.*expected one connection for its water, found 2"):
         links = [c for c in both.connections if c.consumer != "RAD"]
-        replace(both, connections=(*links, Connection("RAD", "hot_water", ("HEAT_PUMP", "SECOND"))))
+        replace(both, connections=(*links, Connection("RAD", "hot_water", ("CARNOT_HEAT_PUMP", "SECOND"))))
     plant = HvacPlant(both)
-    start = plant.start(**{"HEAT_PUMP/supply_water_temperature": 318.0, "SECOND/supply_water_temperature": 308.0})
+    start = plant.start(**{"CARNOT_HEAT_PUMP/supply_water_temperature": 318.0, "SECOND/supply_water_temperature": 308.0})
     assert start.values == (318.0, 308.0)
     assert plant.start(**{"SECOND/supply_water_temperature": 308.0}).values == (313.15, 308.0)
-    told = {"SECOND/supply_water_temperature_setpoint": 310.0, "HEAT_PUMP/supply_water_temperature_setpoint": 320.0}
+    told = {"SECOND/supply_water_temperature_setpoint": 310.0, "CARNOT_HEAT_PUMP/supply_water_temperature_setpoint": 320.0}
     actions = both.actions(supply_air_temperature_setpoint=288.0, **told)
     after, _ = plant.step(start, page["conditions"], actions, 300.0)
     assert after.values[0] > 316.0 and after.values[1] < 312.0
@@ -149,8 +149,8 @@ def test_a_component_that_cannot_be_sized_and_a_missing_input_are_named(page: di
 def test_ranges_of_setpoints_are_their_components(page: dict[str, Any]) -> None:
     radiators = Radiators.sized([800.0], np.array([1]))
     loop = BoilerLoop(2e4, Pump(1.0))
-    joined = page["warm"].with_component("RAD", radiators, hot_water="HEAT_PUMP")
+    joined = page["warm"].with_component("RAD", radiators, hot_water="CARNOT_HEAT_PUMP")
     both = joined.with_component("BOILER", loop, feeds=("RAD",))
     found = {a.name: (a.lowest, a.highest) for a in actuators_of(both, ["west", "east"])}
-    assert found["HEAT_PUMP/supply_water_temperature_setpoint"] == (300.0, 330.0)
+    assert found["CARNOT_HEAT_PUMP/supply_water_temperature_setpoint"] == (300.0, 330.0)
     assert found["BOILER/supply_water_temperature_setpoint"] == (310.0, 355.0)
