@@ -22,7 +22,7 @@ from mpc.cli.evaluate import check, evaluate, simulate
 from mpc.cli.experiment import experiment
 from mpc.cli.imports import import_devices, import_plan, import_telemetry
 from mpc.cli.monitor import monitor
-from mpc.cli.options import switch, value
+from mpc.cli.options import displaying, switch, value
 from mpc.cli.serve import label, serve
 from mpc.plugins import load_plugins
 from thermal.errors import Described
@@ -113,11 +113,13 @@ def _report(error: Exception, command: str, json: bool) -> int:
     return code
 
 
+_REPORTING = (demo, check, simulate, evaluate, calibrate, diagnose, experiment, monitor, control, compare)
+
 for _command in (
     *(demo, doctor, check, import_plan, import_devices, import_telemetry, label),
     *(simulate, evaluate, calibrate, diagnose, experiment, monitor, effects, control, compare, serve),
 ):
-    app.command()(_guarded(_command))
+    app.command()(_guarded(displaying(_command) if _command in _REPORTING else _command))
 
 
 def main() -> None:

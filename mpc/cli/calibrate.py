@@ -176,6 +176,7 @@ def _many(
 ) -> int:  # fmt: skip
     """Calibrate or diagnose each case into a folder of its name; one that fails is reported beside the others."""
     from calibration.fleet.cluster import ClusterExecutor
+    from mpc.reports.display import Displayed, display
 
     do: Callable[..., Sequence[CaseOutcome]]
     files: Files
@@ -193,7 +194,7 @@ def _many(
     try:
         with Waiting(f"{what} cases") as waiting, cluster as executor:
             outcomes = do(
-                cases, out, settings, files=plugins.WithPlugins(files, plugins.loaded), workers=executor or workers,
+                cases, out, settings, files=plugins.WithPlugins(Displayed(files, display()), plugins.loaded), workers=executor or workers,
                 force=force, progress=lambda _, done, total: waiting(f"{done} of {total}", done, total),
             )  # fmt: skip
     except KeyboardInterrupt:
@@ -349,4 +350,4 @@ def _show_diagnosis(result: Diagnosis) -> None:
         say(f"These data cannot test: {', '.join(untestable)}; the report says why.")
     steps = [(f"+ {step.effects[-1]}", step.after, step.share_closed) for step in result.steps]
     errors = [("calibrated model", result.gap, ""), *steps, ("floor", result.floor, "")]
-    show_table(f"Held-out error {result.horizon} ahead", {"": "", "MAE [K]": ".3f", "share closed": ".0%"}, errors)
+    show_table(f"Held-out error {result.horizon} ahead", {"": "", "MAE [K]": ".3f", "share closed": "percent"}, errors)

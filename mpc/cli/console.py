@@ -64,7 +64,9 @@ def say(text: str) -> None:
     text : str
         Wrapped at the width of the terminal.
     """
-    _console().print(text, soft_wrap=not sys.stdout.isatty())
+    from mpc.reports.display import display
+
+    _console().print(display().text(text), soft_wrap=not sys.stdout.isatty())
 
 
 def complain(text: str) -> None:
@@ -88,7 +90,7 @@ def show_table(
     title : str
         Above the table.
     columns : mapping of str to str
-        How the numbers below each header are spelled, such as ``.3f``; columns of text have none.
+        How the numbers below each header are spelled, such as ``.3f`` or ``percent``; columns of text have none.
     rows : iterable of sequence
         Cells; None is a dash, and text stands as it is in columns of numbers too.
     more : str
@@ -98,21 +100,27 @@ def show_table(
     from rich.table import Table
     from rich.text import Text
 
-    listed = list(rows)
+    from mpc.reports.display import display
+
+    listed, shown = list(rows), display()
     table = Table(box=SIMPLE_HEAD, pad_edge=False)
-    for name, spelled in columns.items():
+    heads = [shown.column(name) for name in columns]
+    for (name, _), spelled in zip(heads, columns.values(), strict=True):
         table.add_column(name, justify="right" if spelled else "left", overflow="fold")
     for row in listed[:MOST_ROWS]:
-        table.add_row(*(_cell(value, spelled) for value, spelled in zip(row, columns.values(), strict=True)))
+        cells = [_cell(value, spelled) for value, spelled in zip(row, columns.values(), strict=True)]
+        table.add_row(*(shown.text(change(cell)) for (_, change), cell in zip(heads, cells, strict=True)))
     out = _console()
-    out.print(Text(f"\n{title}", style="bold"))
+    out.print(Text(f"\n{shown.text(title)}", style="bold"))
     out.print(table)
     if len(listed) > MOST_ROWS:
         out.print(f"and {len(listed) - MOST_ROWS} more; {more}")
 
 
 def _cell(value: Any, spelled: str) -> str:
-    return "–" if value is None else value if isinstance(value, str) else format(value, spelled)
+    from mpc.reports.page import spell
+
+    return value if isinstance(value, str) else spell(value, spelled)
 
 
 def answer(json: bool, content: Mapping[str, Any], show: Callable[[], None], report: Path | None = None) -> int:

@@ -15,7 +15,8 @@ from calibration.evaluation.n_step import Evaluation
 from calibration.evaluation.settings import CalibrationSettings
 from calibration.fit.calibrate import calibrate
 from calibration.fit.result import CalibrationResult
-from calibration.results import check_results_folder, write_results
+from calibration.results import check_results_folder
+from mpc.reports.display import write_results
 from mpc.errors import ControlError
 from mpc.loop.noise import SensorNoise
 from mpc.reports.calibration import calibration_verdict, write_calibration

@@ -50,4 +50,4 @@ def time_line(found: Monitoring) -> list[Picture]:
     error.set(title="Mean absolute error by week", ylabel="[K]")
     error.set_ylim(bottom=0.0)
     keys_below(figure, 2)
-    return [picture(figure, "Changes, evidence by day and errors by week, over time")]
+    return [picture(figure, "Changes, evidence by day and errors by week, over time", zoom=True)]
