@@ -194,8 +194,9 @@ def _many(
     try:
         with Waiting(f"{what} cases") as waiting, cluster as executor:
             outcomes = do(
-                cases, out, settings, files=plugins.WithPlugins(Displayed(files, display()), plugins.loaded), workers=executor or workers,
-                force=force, progress=lambda _, done, total: waiting(f"{done} of {total}", done, total),
+                cases, out, settings, files=plugins.WithPlugins(Displayed(files, display()), plugins.loaded),
+                workers=executor or workers, force=force,
+                progress=lambda _, done, total: waiting(f"{done} of {total}", done, total),
             )  # fmt: skip
     except KeyboardInterrupt:
         complain(f"interrupted: what is finished is in {out}, and the same command goes on from there")

@@ -27,6 +27,9 @@ WIDE = 130
 #: A bar appears after this time [s].
 PATIENCE = 2.0
 
+#: Time over which the speed is taken that the time left is estimated from [s]: all of it, for parts differ.
+_PERIOD = 3600.0
+
 #: A table on the terminal ends after this many rows.
 MOST_ROWS = 40
 
@@ -164,17 +167,28 @@ class Waiting:
 
     def __init__(self, label: str) -> None:
         self.label = label
+        self.share = 0.0  # of the whole: it never falls
         self._bar: Bar | None = None
         self._timer: Timer | None = None
 
     def __enter__(self) -> Waiting:
         if sys.stderr.isatty():
             from rich.console import Console
-            from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+            from rich.progress import (
+                BarColumn,
+                Progress,
+                SpinnerColumn,
+                TextColumn,
+                TimeElapsedColumn,
+                TimeRemainingColumn,
+            )
 
             words = TextColumn("{task.description}", markup=False)
-            columns = (SpinnerColumn(), words, BarColumn(), TimeElapsedColumn())
-            self._bar = Progress(*columns, console=Console(stderr=True), transient=True)
+            columns = (SpinnerColumn(), words, BarColumn(), TimeElapsedColumn(), TextColumn("left about"))
+            self._bar = Progress(
+                *columns, TimeRemainingColumn(), console=Console(stderr=True), transient=True,
+                speed_estimate_period=_PERIOD,
+            )  # fmt: skip
             self._bar.add_task(self.label, total=None)
             self._timer = Timer(PATIENCE, self._bar.start)
             self._timer.daemon = True
@@ -185,7 +199,9 @@ class Waiting:
         """Say what goes on, and how much of it is done."""
         if self._bar is not None:
             name = f"{self.label}: {stage}" if stage not in self.label else self.label
-            self._bar.update(self._bar.task_ids[0], description=name, completed=done, total=total)
+            known = 1.0 if total > 0 else None  # shares of the whole, as commands may count one thing after another
+            self.share = max(self.share, done / total if total > 0 else 0.0)
+            self._bar.update(self._bar.task_ids[0], description=name, completed=self.share, total=known)
 
     def say(self, text: str) -> None:
         """Write a sentence or two to stdout, above the bar.

@@ -144,7 +144,6 @@ def _carry_out(
 
 
 def _show(found: Experiment, verdict: str) -> None:
-    from mpc.reports.display import write_results
     from mpc.reports.experiment import steps_of
 
     say(verdict)

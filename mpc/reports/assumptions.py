@@ -27,14 +27,15 @@ def assumption_rows(study: Study) -> list[tuple[str, str]]:
     scenario, given, n = study.scenario, study.settings, study.steps
     currency, heat = scenario.currency, scenario.heat
     sensors = "with noise" if given.noise is not None else "exact"
-    weather = "a typical year from a file, no particular day" if scenario.weather.typical else "as measured with the case"
+    typical = scenario.weather.typical
+    weather = "A typical year from a file, no particular day" if typical else "As measured with the case"
     demand = [f"{charge.name}: {listed_prices(np.asarray(charge.rates), currency)} per kW and month" for charge in
               given.tariff.demand]  # fmt: skip
     emissions = scenario.electricity_carbon[:n] * 1000.0
     rows = [
         ("plant", f"Simulated, not the real building: the model of the case with the parameters given, stepped by "
          f"{_PLANTS[given.kind]}, in closed loop with a simulated HVAC system; sensors {sensors}."),
-        ("weather", f"{weather[0].upper()}{weather[1:]}; forecasts "
+        ("weather", f"{weather}; forecasts "
          f"{'with the errors of a day-ahead forecast' if given.errors else 'perfect'}."),
         ("tariff", given.tariff.name or "given"),
         ("electricity price", f"{listed_prices(scenario.electricity_price[:n], currency)} per kWh"),

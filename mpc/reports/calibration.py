@@ -148,7 +148,8 @@ def _emitter_sentences(result: CalibrationResult) -> list[str]:
         return []
     values = {p.name: p.value for p in result.parameters}
     floors = [name.partition("@")[2] for name, v in values.items() if name.startswith("floor_heat_share@") and v > 0.5]
-    radiant = f"{percent(values['radiator_radiant_share'])} of it radiates" if "radiator_radiant_share" in values else ""
+    share = values.get("radiator_radiant_share")
+    radiant = "" if share is None else f"{percent(share)} of it radiates"
     if not floors:
         return [f"Metered heat behaves as if radiators gave it: {radiant}."] if radiant else []
     rest = len(floors) < sum(name.startswith("floor_heat_share@") for name in values)
@@ -169,9 +170,11 @@ def _parameter_sentence(parameters: Sequence[ParameterEstimate]) -> str:
     whole = [p for p in estimated if p.at_bound and p.base == "floor_heat_share"]
     bound = [in_words(p.name) for p in estimated if p.at_bound and p not in (*absent, *whole)]
     free = len(estimated) - told - len(bound) - len(absent) - len(whole)
-    parts = [f"Of {counted(len(estimated), 'estimated parameter')} the data determine {told or 'none'}"]
+    begin = f"Of {counted(len(estimated), 'estimated parameter')} the data determine {told or 'none'} by "
+    parts = [begin + ("itself" if told == 1 else "themselves")]
     if free:
-        parts.append(f"{free} stay{'s' if free == 1 else ''} open within the physical range")
+        open_ = f"{free} stay{'s' if free == 1 else ''} open within the physical range"
+        parts.append(f"{open_}, as other values predict equally well: do not quote them")
     if absent:
         parts.append(f"{counted(len(absent), 'solar aperture')} of no size: no sun is seen to enter there")
     if whole:

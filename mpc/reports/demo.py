@@ -49,7 +49,8 @@ def render_demo(
     cards = [(f"{e.metrics.mae:.2f} K", told) for e, told in zip(errors.values(), meanings, strict=True)]
     mpc, best = comparison.of("mpc"), comparison.best_rule
     if mpc is not None and best is not None:
-        cards.append((percent(1.0 - mpc.cost / best.cost), "less spent on energy than by the best rule, on one simulated day"))
+        saved = "less spent on energy than by the best rule, on one simulated day"
+        cards.append((percent(1.0 - mpc.cost / best.cost), saved))
     content = {
         "case": case,
         "fine": fine,

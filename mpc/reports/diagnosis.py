@@ -13,9 +13,9 @@ from calibration.diagnosis.diagnosis import Diagnosis, Replay
 from calibration.diagnosis.refit.search import Round, accepted_from
 from calibration.results import Content, check_results_folder
 from mpc.reports import diagnosis_words
-from mpc.reports.display import write_results
 from mpc.reports.correction_words import correction_sentence, driver_rows
 from mpc.reports.diagnosis_words import accepted, alike, called, in_zones, rivals
+from mpc.reports.display import write_results
 from mpc.reports.drift_words import drift_sentence
 from mpc.reports.evaluation import command, predictions_table, subtitle
 from mpc.reports.figures.diagnosis import change_panels, drift_lines, hour_bars, missing_lines

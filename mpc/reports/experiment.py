@@ -152,8 +152,8 @@ def _content(found: Experiment, case: Case, outcome: Outcome | None) -> dict[str
     said = [] if outcome is None else [(called(e), outcome.evidence[e] - max(outcome.evidence.values()),
                                        outcome.probability[e]) for e in outcome.ranked]  # fmt: skip
     return {
-        "case": case.building.name, "verdict": experiment_verdict(found, outcome), "means": experiment_means(found, outcome),
-        "prices": found.settings.prices,
+        "case": case.building.name, "verdict": experiment_verdict(found, outcome),
+        "means": experiment_means(found, outcome), "prices": found.settings.prices,
         "subtitle": f"{clock(found.start)} to {clock(found.schedule.end)}", "found": found,
         "chance": found.chance, "usual": found.usual_chance, "pairs": pairs,
         "steps": steps_of(found), "worst": worst, "cost": significant(found.best.cost, 2),

@@ -58,7 +58,8 @@ def check_means(check: CaseCheck) -> Means:
         answer += f", with {counted(len(check.anomalies), 'point')} to look at." if check.anomalies else "."
     trust = f"{percent(usable)} of all readings are usable, over {days:.3g} days."
     if blind:
-        trust += f" {blind} of {counted(len(check.zones), 'zone')} have no temperature sensor: nothing checks the model there."
+        trust += f" {blind} of {counted(len(check.zones), 'zone')} have no "
+        trust += "temperature sensor: nothing checks the model there."
     if days < _FEW_DAYS:
         trust += " That is little: a week or more of varied weather makes a model that can be relied on."
     first = [*errors, *check.anomalies]
@@ -80,19 +81,19 @@ def prediction_means(evaluation: Evaluation, unchanged: float, what: str = "The 
         Is judged.
     """
     mae, ahead = evaluation.metrics.mae, duration(evaluation.steps * evaluation.step_seconds)
-    answer = f"{what} says room temperatures {ahead} ahead to within about {kelvin(mae)} degrees C on average."
+    answer = f"{what} predicts room temperatures {ahead} ahead to within about {kelvin(mae)} degrees C on average."
     beside = evaluation.yardsticks
     runs = sum(len(p.start) for p in evaluation.predictions)
     if beside is not None and not beside.useful(mae):
         better = min(error for error in beside.made.values())
         trust = f"Not yet: a simple forecast that needs no building model does as well or better ({kelvin(better)} "
         trust += "degrees C)."
-        then = "Do not base decisions on it yet. Give it more days with heating and cooling that vary, and sun if it is "
-        return Means(answer, trust, then + "measured; then calibrate again.")
+        then = "Do not base decisions on it yet. Give it more days with heating that varies, and the sun where "
+        return Means(answer, trust, then + "it is measured; then calibrate again.")
     ratio = unchanged / mae if mae > 0.0 else 1.0
     if ratio > 1.0:
-        trust = f"It was tried {runs} times. Saying that nothing changes would be off by {kelvin(unchanged)} degrees C, "
-        trust += f"{ratio:.1f} times as much."
+        trust = f"It was tried {runs} times. Saying that nothing changes would be off by {kelvin(unchanged)} "
+        trust += f"degrees C, {ratio:.1f} times as much."
     else:
         trust = f"No: in {runs} trials, saying that nothing changes is closer ({kelvin(unchanged)} degrees C)."
     if beside is not None:
@@ -139,7 +140,7 @@ def calibration_means(result: CalibrationResult, unchanged: float) -> Means:
     trust += determined_words([p for p in result.parameters if p.standard_error is not None])
     if not result.solver.success:
         return Means(answer, f"No: the solver stopped early ({result.solver.status}).",
-                     "Run it again with more starts (--starts 6), or look at the data with buildingmpc check.")  # fmt: skip
+                     "Run it again with more starts (--starts 6), or look at the data: buildingmpc check.")  # fmt: skip
     useful = held_out.yardsticks is None or held_out.yardsticks.useful(mae)
     then = "Next step: buildingmpc diagnose, which looks for what the model still lacks." if useful else found.next
     return Means(answer, trust.strip(), then)
@@ -154,12 +155,12 @@ def simulation_means(summary: Mapping[str, float]) -> Means:
         Of `mpc.reports.case.simulation_summary`.
     """
     length = duration(summary["steps"] * summary["step_seconds"])
-    answer = f"Left alone for {length}, the model drifts {kelvin(summary['mae'])} degrees C from the sensors on average."
+    answer = f"Left alone for {length}, the model is {kelvin(summary['mae'])} degrees C off the sensors on average."
     lean = "warm" if summary["bias"] > 0 else "cold"
     size = abs(summary["bias"]) / max(summary["mae"], 1e-9)
     trust = f"Most of that is one way: the model is too {lean}, as when heat is missing or metered wrongly." if (
         size > 0.7) else "It errs in both directions, which a fit or better inputs may improve."  # fmt: skip
-    return Means(answer, trust, "To judge predictions, use buildingmpc evaluate; to improve them, buildingmpc calibrate.")
+    return Means(answer, trust, "To judge predictions: buildingmpc evaluate; to improve them: buildingmpc calibrate.")
 
 
 def control_means(run: ControlRun) -> Means:
@@ -201,13 +202,16 @@ def comparison_means(comparison: Comparison) -> Means:
     return Means(answer, _simulated(hours), _NEXT)
 
 
-_NEXT = "Check the assumptions below (prices, hours, comfort) against your own, and repeat with at least two weeks of each season."
+_NEXT = (
+    "Check the assumptions below (prices, hours, comfort) against your own, and repeat with at least two weeks of each "
+    "season."
+)
 
 
 def _simulated(hours: float) -> str:
     text = "As far as the assumptions below fit your building: it is simulated, nothing was tried on the real one."
     if hours < _SHORT:
-        text += f" {duration(3600.0 * hours).capitalize()} of one season say little about a year."
+        text += f" A run of {duration(3600.0 * hours)} says little about a year."
     return text
 
 
@@ -226,4 +230,5 @@ def comfort_words(run: ControlRun) -> str:
     outside = [z.zone for z in run.kpis.zones if z.below + z.above >= NOTICED]
     rooms = listed(outside) if len(outside) <= 3 else f"{len(outside)} of {len(run.kpis.zones)} rooms"
     how = "cold" if worst.below >= worst.above else "warm"
-    return f"{rooms} left the comfort band; the worst, {worst.zone}, was too {how} by up to {significant(size, 2)} degrees C."
+    text = f"{rooms} left the comfort band; the worst, {worst.zone}, was too {how} by up to "
+    return f"{text}{significant(size, 2)} degrees C."

@@ -1,4 +1,4 @@
-"""What pages of findings mean for who runs the building: a diagnosis, an experiment, a monitoring, and all of a demo."""
+"""What findings mean for who runs the building: a diagnosis, an experiment, a monitoring, and all of a demo."""
 
 from collections.abc import Mapping, Sequence
 
@@ -35,8 +35,8 @@ def diagnosis_means(result: Diagnosis) -> Means:
     if name == "unexplained":
         best = result.verdict.candidates[0]
         answer = "Something is missing in the model, and none of the known causes explains it."
-        trust = f"The gap is real ({kelvin(result.gap)} degrees C where {kelvin(result.floor)} should be possible); its "
-        trust += f"cause is not known. The best guess, {called(best.effect)}, has {sure(best.probability)}."
+        trust = f"The gap is real ({kelvin(result.gap)} degrees C where {kelvin(result.floor)} should be possible); "
+        trust += f"its cause is not known. The best guess, {called(best.effect)}, has {sure(best.probability)}."
         advice = CATALOGUE[best.effect].separated_by if best.effect in CATALOGUE else ""
         return Means(answer, trust, f"Measure before you change anything. {_sentence(advice)}".strip())
     effects = [(r.screened.effect, r.screened.zones) for r in found]
@@ -73,8 +73,8 @@ def experiment_means(found: Experiment, outcome: Outcome | None) -> Means:
         return Means(f"It is {called(outcome.named)}.", f"{chance} sure, from the days of the experiment alone.",
                      "The diagnosis beside it goes on from there.")  # fmt: skip
     if outcome is not None:
-        return Means(f"It was carried out and does not say whether it is {names}.", "The evidence is too weak.",
-                     f"Measure instead: {'; or '.join(found.instead)}." if found.instead else "Measure more.")  # fmt: skip
+        then = f"Measure instead: {'; or '.join(found.instead)}." if found.instead else "Measure more."
+        return Means(f"It was carried out and does not say whether it is {names}.", "The evidence is too weak.", then)
     if found.verdict == "hopeless":
         return Means(f"No change of setpoints would tell whether it is {names}.",
                      f"The best of {found.tried} plans has a chance of {percent(found.chance)}.",
@@ -83,8 +83,8 @@ def experiment_means(found: Experiment, outcome: Outcome | None) -> Means:
     answer = f"{found.schedule.hours:.3g} hours of planned setpoints can tell whether it is {names}."
     trust = f"The chance that it does is {percent(found.chance)}; running as usual has {percent(found.usual_chance)}. "
     trust += "It is reckoned with the model, not tried."
-    then = f"Follow the list below. It costs about {significant(found.best.cost, 2)} in heat and cold, and no zone leaves "
-    return Means(answer, trust, then + f"its comfort by more than {kelvin(worst)} K h beyond usual.")
+    then = f"Follow the list below. It costs about {significant(found.best.cost, 2)} in heat and cold, and no zone "
+    return Means(answer, trust, then + f"leaves its comfort by more than {kelvin(worst)} K h beyond usual.")
 
 
 def monitoring_means(found: Monitoring) -> Means:
@@ -133,7 +133,8 @@ def demo_means(errors: Mapping[str, Evaluation], effects: Sequence[str], compari
         answer += comfort_words(mpc)
     trust = "Errors are those of days that the model had not seen. Costs are of one simulated day, with the prices and "
     trust += "comfort below: they show how it works, not what a year saves."
-    return Means(answer, trust, "Try it on a building of your own: buildingmpc label makes a case from plans and a list of devices.")
+    then = "Try it on a building of your own: buildingmpc label makes a case from plans and a list of devices."
+    return Means(answer, trust, then)
 
 
 def _sentence(text: str) -> str:

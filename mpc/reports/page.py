@@ -150,8 +150,8 @@ def _cells(
     if not isinstance(columns[0], str):
         row = [spell(make_attrgetter(environment, path)(row), how) for _, path, how in columns]
     titles = [column if isinstance(column, str) else column[0] for column in columns]
-    kinds = ["name" if k == 0 else "unit" if t == "unit" else "text" if k in left else "n" for k, t in enumerate(titles)]
-    return list(zip(kinds, row, strict=False))
+    kinds = ["unit" if title == "unit" else "text" if k in left else "n" for k, title in enumerate(titles)]
+    return list(zip(["name", *kinds[1:]], row, strict=True))
 
 
 def kelvin(value: float) -> str:

@@ -177,7 +177,7 @@ def make_study(
     longer = StepGrid(grid.start, MODEL_STEP, grid.n_steps + round(HORIZON_HOURS * 3600.0 / MODEL_STEP))
     built = model_settings(given.parameters, dx=given.dx)
     if given.system is None:
-        notes += ("sizes of the plant follow from the building's loads (thermal.system.sizing.size_system)",)
+        notes += ("sizes of the plant follow from the loads of the building",)
     gains = None
     if "internal_gains" in built.effects:
         gains = InternalGains(sensible=0.0, equipment=0.0, lights=0.0)

@@ -100,7 +100,7 @@ def for_phone(figure: Figure) -> None:
     figure : Figure
         That is not needed wide any more.
     """
-    width, height = figure.get_size_inches()
+    height = float(figure.get_size_inches()[1])
     figure.set_size_inches(NARROW, max(min(height, 2.6), 0.9 * height))
     for axes in figure.axes:
         for axis in (axes.xaxis, axes.yaxis):

@@ -47,7 +47,7 @@ def hour_bars(shares: FloatArray) -> list[Picture]:
     axes.grid(axis="x", visible=False)
     axes.legend(fontsize=8, loc="best")
     worst = int(np.argmax(shares))
-    alt = f"Share of the squared error by hour of the day; most, {percent(float(shares[worst]))}, from {worst} to {worst + 1} h"
+    alt = f"Share of the squared error by hour; most, {percent(shares[worst])}, from {worst} to {worst + 1} h"
     return [picture(figure, alt)]
 
 
@@ -81,7 +81,8 @@ def change_panels(
             x, before.measured[rows, column] - style.CELSIUS, color=style.MEASURED, linewidth=1.1, label="measured"
         )
         keys_below(figure, 3)
-        pictures.append(picture(figure, f"Zone {zone}, measured and predicted; mean absolute error {told} K", zoom=True))
+        alt = f"Zone {zone}, measured and predicted; mean absolute error {told} K"
+        pictures.append(picture(figure, alt, zoom=True))
     return pictures
 
 

@@ -143,7 +143,7 @@ def _named(label: Any) -> dict[str, Any]:
 
 @cache
 def _library() -> str | None:
-    """Plotly's own script, packed; None where plotly is not installed."""
+    """Pack plotly's own script; None where plotly is not installed."""
     try:
         from plotly.offline import get_plotlyjs
     except ImportError:
