@@ -27,8 +27,7 @@ def assumption_rows(study: Study) -> list[tuple[str, str]]:
     scenario, given, n = study.scenario, study.settings, study.steps
     currency, heat = scenario.currency, scenario.heat
     sensors = "with noise" if given.noise is not None else "exact"
-    typical = scenario.weather.typical
-    weather = "A typical year from a file, no particular day" if typical else "As measured with the case"
+    weather = f"{study.weather[:1].upper()}{study.weather[1:]}"
     demand = [f"{charge.name}: {listed_prices(np.asarray(charge.rates), currency)} per kW and month" for charge in
               given.tariff.demand]  # fmt: skip
     emissions = scenario.electricity_carbon[:n] * 1000.0

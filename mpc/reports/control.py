@@ -205,7 +205,19 @@ def trajectory(run: ControlRun) -> pd.DataFrame:
     columns["electricity_price"], columns["gas_price"] = scenario.electricity_price[:n], scenario.gas_price[:n]
     columns["true/electricity"] = record.electricity
     columns["true/gas"] = np.zeros(n) if record.gas is None else record.gas
-    return pd.DataFrame(columns, index=frame.index)
+    table = pd.DataFrame(columns, index=frame.index)
+    table.attrs["units"] = {name: _unit_of(name, scenario.currency) for name in columns}
+    return table
+
+
+def _unit_of(name: str, currency: str) -> str:
+    """Unit of a column of the course."""
+    if name.endswith("_price"):
+        return f"{currency}/kWh"
+    if name in ("true/electricity", "true/gas"):
+        return "W"
+    point = name.rpartition("/")[2]
+    return QUANTITIES[POINT_TYPES[point].quantity].file_unit if point in POINT_TYPES else "degC"
 
 
 def own_indicators(kpis: Kpis) -> list[tuple[str, str]]:
@@ -312,7 +324,7 @@ def comparison_columns(currency: str) -> list[str]:
     """
     return [
         "controller", f"energy cost [{currency}]", f"energy cost and price of discomfort [{currency}]",
-        "saved of the second column, against the best rule", "discomfort, mean zone [K h]",
+        "saved against the best rule, discomfort counted", "discomfort, mean zone [K h]",
         "discomfort, worst zone [K h]", "energy [kWh/m²]", "highest quarter of an hour of electricity [W/m²]",
         "emissions of CO₂ [g/m²]", "share of the perfect-forecast savings",
     ]  # fmt: skip

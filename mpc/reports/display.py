@@ -202,7 +202,7 @@ def _table(table: pd.DataFrame, table_format: str) -> bytes | str:
     units = table.attrs.get("units", {})
     flat = table.rename(columns={c: f"{c} [{units[c]}]" for c in table if c in units}).reset_index()
     if table_format == "csv":
-        return str(flat.to_csv(index=False, lineterminator="\n"))
+        return str(flat.to_csv(index=False, lineterminator="\n", float_format="%.7g"))
     for name in flat.select_dtypes("datetimetz"):  # a workbook knows no time zones
         flat.insert(int(flat.columns.get_loc(name)) + 1, f"{name} UTC", flat[name].dt.tz_convert(None))  # type: ignore[arg-type]
         flat[name] = flat[name].dt.tz_localize(None)

@@ -71,7 +71,9 @@ def expected_table(found: Experiment) -> pd.DataFrame:
             columns[member] = found.best.emulated[member].zone[:, i] - _FREEZING
             columns[f"{member}_usual"] = found.usual.emulated[member].zone[:, i] - _FREEZING
         parts.append(pd.DataFrame({"zone": zone, **columns}, index=stamps))
-    return pd.concat(parts).sort_index(kind="stable")
+    table = pd.concat(parts).sort_index(kind="stable")
+    table.attrs["units"] = {name: "degC" for name in table if name != "zone"}
+    return table
 
 
 def _stamps(found: Experiment) -> pd.DatetimeIndex:

@@ -196,9 +196,14 @@ def comparison_means(comparison: Comparison) -> Means:
         answer = f"{cheapest.entry.title.capitalize()} costs least: {cheapest.cost:,.2f} {cheapest.kpis.currency}. "
         return Means(answer + comfort_words(cheapest), _simulated(hours), _NEXT)
     saved = 1.0 - mpc.cost / best.cost if best.cost > 0.0 else 0.0
-    answer = f"Looking ahead {'saves' if saved >= 0 else 'costs'} {percent(abs(saved))} "
-    answer += f"{'of' if saved >= 0 else 'more than'} the energy cost of the best fixed rules "
-    answer += f"({mpc.cost:,.2f} against {best.cost:,.2f} {mpc.kpis.currency}). {comfort_words(mpc)}"
+    answer = f"Control that looks ahead spends {percent(abs(saved))} {'less' if saved >= 0 else 'more'} on energy than "
+    answer += f"the best fixed rules ({mpc.cost:,.2f} against {best.cost:,.2f} {mpc.kpis.currency}). "
+    answer += f"With it: {comfort_words(mpc)}"
+    if comfort_words(best) != comfort_words(mpc):
+        answer += f" With the rules: {comfort_words(best)}"
+        counted = comparison.saving(mpc)
+        if counted is not None:
+            answer += f" Counting discomfort, it is {percent(abs(counted))} {'better' if counted >= 0 else 'worse'}."
     return Means(answer, _simulated(hours), _NEXT)
 
 

@@ -39,12 +39,13 @@ _UNITS = (
     ("s/m/h", "second / meter", "hour / mile", "1/h/mph"),
 )
 
-_NUMBER = r"[+\-−±]?(?:\d{1,3}(?:[ \u202f]\d{3})+(?!\d)(?:\.\d+)?|\d+(?:\.\d+)?(?:e[+-]?\d+)?)"
+#: A number as reports spell it.
+NUMBER = r"[+\-−±]?(?:\d{1,3}(?:[ \u202f]\d{3})+(?!\d)(?:\.\d+)?|\d+(?:\.\d+)?(?:e[+-]?\d+)?)"
 _NAMES = "|".join(re.escape(name) for name in sorted((u[0] for u in _UNITS), key=len, reverse=True))
 
 #: A number with its unit, or several that share one: ``0.4 to 0.6 K``.
 _QUANTITY = re.compile(
-    rf"(?<![\w.:/\-])({_NUMBER}(?:(?: to | and | or | ± | → )[+\-−]?{_NUMBER})*)([ \u00a0])({_NAMES})(?![\w/²³·°^*])"
+    rf"(?<![\w.:/\-])({NUMBER}(?:(?: to | and | or | ± | → )[+\-−]?{NUMBER})*)([ \u00a0])({_NAMES})(?![\w/²³·°^*])"
 )
 _IN_BRACKETS = re.compile(rf"\[(%?)({_NAMES})\]")
 
@@ -131,7 +132,7 @@ def converted_text(text: str) -> str:
         line = inch_pound(unit)
         if line is None:  # pragma: no cover - the pattern holds only units that are known
             return match[0]
-        return re.sub(_NUMBER, lambda m: converted_number(m[0], line), numbers) + space + line.unit
+        return re.sub(NUMBER, lambda m: converted_number(m[0], line), numbers) + space + line.unit
 
     def bracket(match: re.Match[str]) -> str:
         line = inch_pound(match[2])
@@ -155,7 +156,8 @@ def converted_number(text: str, line: Callable[[float], float]) -> str:
     about = sign == "±" and getattr(line, "offset", 0.0)
     value = float(plain) * (-1.0 if sign in ("-", "−") else 1.0)
     found = line(value) - (line(0.0) if about else 0.0)
-    mantissa = plain.partition("e")[0].replace(".", "").lstrip("0")
+    mantissa = plain.partition("e")[0]
+    mantissa = mantissa.replace(".", "").lstrip("0") if "." in mantissa else mantissa.strip("0")
     known = max(2, len(mantissa))
     if found == 0.0:
         return "0"
@@ -189,7 +191,7 @@ def converted_column(title: str) -> tuple[str, Callable[[str], str]]:
     line = inch_pound(found[2]) if found else None
     if line is None:
         return title, lambda cell: cell
-    return converted_text(title), lambda cell: re.sub(_NUMBER, lambda m: converted_number(m[0], line), cell)
+    return converted_text(title), lambda cell: re.sub(NUMBER, lambda m: converted_number(m[0], line), cell)
 
 
 def converted_page(page: str) -> str:
@@ -222,7 +224,7 @@ def _converted_table(table: str) -> str:
             change = columns[k] if k < len(columns) and kind == "d" else None
             counted = k < len(heads) and "[" in heads[k][2]  # has a unit of its own, such as per cent
             if own is not None and 'class="n"' in begin and not counted:
-                text = re.sub(_NUMBER, lambda m, line=own: converted_number(m[0], line), text)  # type: ignore[misc]
+                text = re.sub(NUMBER, lambda m, line=own: converted_number(m[0], line), text)  # type: ignore[misc]
             elif own is not None and 'class="unit"' in begin:
                 text = own.unit
             elif change is not None and "<" not in text:

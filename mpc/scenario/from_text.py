@@ -103,5 +103,7 @@ def read_comfort(text: str) -> ComfortBand:
     found = [re.fullmatch(rf"({_NUMBER})\s*(?:deg|°)?([CF]?)", part) for part in parts]
     ScenarioError.unless(len(parts) in (2, 4) and all(found), "--comfort", expected, repr(text))
     values = [round(float(to_si(float(m[1]), f"deg{m[2] or 'C'}", "temperature")), 6) for m in found if m]
+    rising = all(low < high for low, high in zip(values[::2], values[1::2], strict=True))
+    ScenarioError.unless(rising, "--comfort", expected, repr(text), "each LOW is below its HIGH")
     bands = {"occupied": (values[0], values[1])} | ({"unoccupied": (values[2], values[3])} if len(values) == 4 else {})
     return ComfortBand(**bands)  # type: ignore[arg-type]

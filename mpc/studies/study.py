@@ -82,6 +82,8 @@ class Study:
         What was chosen.
     notes : tuple of str
         What was assumed, in words.
+    weather : str
+        Where the weather is from, in words.
     """
 
     name: str
@@ -93,6 +95,7 @@ class Study:
     built: ModelSettings
     settings: StudySettings
     notes: tuple[str, ...] = ()
+    weather: str = "as measured with the case"
 
     @property
     def building(self) -> Building:
@@ -188,7 +191,15 @@ def make_study(
         believed = model_settings(given.controller_parameters, dx=given.dx)
         model = reduced(believed, ready, given.controller_parameters, given.order)
     system = given.system or size_system(ready)
-    return Study(building.name, scenario, grid.n_steps, system, truth, model, built, given, notes)
+    return Study(building.name, scenario, grid.n_steps, system, truth, model, built, given, notes, _weather_words(weather))
+
+
+def _weather_words(weather: Weather) -> str:
+    """Say where weather is from."""
+    if not weather.typical:
+        return "as measured with the case"
+    place = weather.location
+    return f"a typical year from a file, no particular day, at {place.latitude:.2f}°, {place.longitude:.2f}°"
 
 
 def _prolonged(weather: Weather, run: StepGrid, whole: StepGrid) -> Weather:

@@ -14,7 +14,7 @@ from matplotlib.legend import Legend
 from matplotlib.ticker import FixedFormatter, FixedLocator, FuncFormatter, MaxNLocator, ScalarFormatter
 
 from mpc.reports.display import Display
-from mpc.reports.units import inch_pound
+from mpc.reports.units import NUMBER, converted_number, inch_pound
 
 #: Width of a figure on a phone [inch]: 374 px, which a screen of 390 px shows at about nine tenths.
 NARROW = 3.9
@@ -35,6 +35,9 @@ DARK = {
     "#0072b2": "#56b4f0", "#d55e00": "#ff9d4d", "#c00028": "#ff6b81", "#8a8f98": "#a3abb5", "#7b3f98": "#c792ea",
     "#009e73": "#3ecf9e",
 }  # fmt: skip
+
+#: Decimals of coordinates beyond a hundredth of a point, which no screen shows: a third of a page.
+_LONG = re.compile(r"(?<=[ LMCQ\"-])(\d+\.\d\d)\d+(?=[ \n\"LMCQ])")
 
 _UNIT = re.compile(r"\[([^\]]+)\]")
 
@@ -85,6 +88,10 @@ def in_units(figure: Figure, shown: Display) -> None:
                 if not isinstance(axis.get_major_locator(), FixedLocator):
                     axis.set_major_locator(_InUnits(line))
                 axis.set_major_formatter(FuncFormatter(lambda x, _, line=line: f"{line(x):.6g}".replace("-", "−")))
+        lines = [line for line in map(axis_line, (axes.yaxis, axes.xaxis)) if line is not None]
+        for text in axes.texts if lines else ():  # labels of bars and points: numbers of the axis
+            if re.fullmatch(NUMBER, text.get_text()):
+                text.set_text(converted_number(text.get_text(), lines[0]))
     for text in figure.findobj(lambda artist: hasattr(artist, "get_text") and hasattr(artist, "set_text")):
         if isinstance(text.axes, Axes) and text in (  # type: ignore[attr-defined]
             *text.axes.get_xticklabels(), *text.axes.get_yticklabels()):  # type: ignore[attr-defined]  # fmt: skip
@@ -154,5 +161,6 @@ def for_dark(svg: str) -> str:
         for what in ("fill", "stroke"):
             if f"{what}: {light}" in svg:
                 rules.append(f'[style*="{what}: {light}"]{{{what}:{dark}!important}}')
+    svg = _LONG.sub(r"\1", svg)
     at = svg.index(">") + 1
     return f"{svg[:at]}<style>@media (prefers-color-scheme: dark){{{''.join(rules)}}}</style>{svg[at:]}"

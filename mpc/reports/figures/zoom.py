@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from mpc.reports.display import Display
-from mpc.reports.figures.adapt import axis_line
+from mpc.reports.figures.adapt import DARK, axis_line
 
 #: Dashes of plotly by those of Matplotlib.
 _DASHES = {"-": "solid", "--": "dash", ":": "dot", "-.": "dashdot"}
@@ -53,7 +53,7 @@ def zoomable(figure: Figure, shown: Display) -> dict[str, Any]:
         base = own.index(first or axes)
         y = {"title": {"text": shown.text(axes.get_ylabel())}, "anchor": f"x{tail}", "zeroline": False}
         if first is None:
-            y["domain"] = [round(max(0.0, tops[base].y0 - 0.02), 3), round(min(1.0, tops[base].y1), 3)]
+            y["domain"] = [round(max(0.0, tops[base].y0), 3), round(min(1.0, tops[base].y1 - 0.02), 3)]
         else:
             y |= {"overlaying": f"y{_tail(figure, first)}", "side": "right", "showgrid": False}
         x = {"anchor": f"y{tail}", "showticklabels": base == len(own) - 1 or not _shares(own), "zeroline": False}
@@ -156,7 +156,9 @@ def _packed(text: str) -> str:
 
 
 def zoom_scripts(figures: Mapping[str, Any]) -> dict[str, str] | None:
-    """Give what a page holds so that its figures zoom: plotly and the figures, packed; None without plotly or figures.
+    """Give what a page holds so that its figures zoom: plotly and figures, packed, and colours of a dark page.
+
+    None where plotly is not installed, or there is nothing to zoom.
 
     Parameters
     ----------
@@ -166,4 +168,4 @@ def zoom_scripts(figures: Mapping[str, Any]) -> dict[str, str] | None:
     library = _library()
     if not figures or library is None:
         return None
-    return {"library": library, "figures": _packed(json.dumps(dict(figures), allow_nan=False))}
+    return {"library": library, "figures": _packed(json.dumps(dict(figures), allow_nan=False)), "dark": json.dumps(DARK)}
