@@ -158,12 +158,14 @@ def converted_number(text: str, line: Callable[[float], float]) -> str:
     found = line(value) - (line(0.0) if about else 0.0)
     mantissa = plain.partition("e")[0]
     mantissa = mantissa.replace(".", "").lstrip("0") if "." in mantissa else mantissa.strip("0")
-    known = max(2, len(mantissa))
+    known, decimals = max(2, len(mantissa)), len(plain.partition(".")[2])
     if found == 0.0:
         return "0"
     if "e" in plain:
         return f"{found:.{known - 1}e}".replace("-", "−", 1) if found < 0 else f"{found:.{known - 1}e}"
     places = known - len(str(int(abs(found)))) if abs(found) >= 1.0 else known + len(_zeros(found))
+    if getattr(line, "offset", 0.0) and not about:  # a temperature has no zero that digits could count from
+        places = decimals
     rounded = round(found, places)
     spelled = f"{abs(rounded):,.{max(0, places)}f}".replace(",", " ")
     return ("±" if sign == "±" else "−" if rounded < 0 else "+" if sign == "+" else "") + spelled

@@ -51,7 +51,8 @@ def test_a_number_keeps_its_significant_digits() -> None:
     assert line is not None
     assert converted_number("360 000", line) == "18" and converted_number("3.604e+05", line) == "1.763e+01"
     degrees = inch_pound("°C")
-    assert degrees is not None and converted_number("−17.8", degrees) == "−0.040" and converted_number("±1.0", degrees) == "±1.8"
+    assert degrees is not None and converted_number("−17.9", degrees) == "−0.2"
+    assert converted_number("±1.0", degrees) == "±1.8" and converted_number("21", degrees) == "70"
 
 
 def test_columns_go_by_their_heads() -> None:
