@@ -44,7 +44,8 @@ def read_tariff(electricity: str | None = None, gas: str | None = None, currency
     Parameters
     ----------
     electricity : str, optional
-        A price per kilowatt-hour, or a file of the Utility Rate Database; the paper's time of use by default.
+        A price per kilowatt-hour, or a file of the Utility Rate Database, with a colon and the number of a tier behind
+        it where it has several; the paper's time of use by default.
     gas : str, optional
         As `read_gas_price` takes it; the paper's by the month by default.
     currency : str, optional
@@ -73,7 +74,9 @@ def read_tariff(electricity: str | None = None, gas: str | None = None, currency
         told = default.name + ("" if gas is None else f"; gas at {gas.strip()} {named}")
         return Tariff(default.electricity, of_gas, (), named, told)
     if not constant:
-        return read_urdb(Path(electricity), of_gas)
+        file, _, tier = electricity.rpartition(":")
+        tiered = bool(file) and tier.isdigit()
+        return read_urdb(Path(file if tiered else electricity), of_gas, tier=int(tier) if tiered else None)
     price = float(electricity)
     ScenarioError.unless(price >= 0.0, "--tariff", "a price of 0 or more, or a file", electricity)
     return Tariff(ConstantRate(price), of_gas, (), named, f"{price:g} {named}/kWh always")
