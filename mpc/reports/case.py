@@ -12,7 +12,7 @@ from mpc.reports.figures.errors import Series, zone_panels
 from mpc.reports.figures.plan import plan_drawings, quality_timeline
 from mpc.reports.figures.style import CELSIUS
 from mpc.reports.means import check_means, simulation_means
-from mpc.reports.page import counted, duration, kelvin, significant, write_report
+from mpc.reports.page import counted, duration, kelvin, percent, significant, write_report
 from thermal.case.building import FloorPlans
 from thermal.case.case import Case
 from thermal.case.check import CaseCheck
@@ -78,7 +78,7 @@ def check_verdict(check: CaseCheck) -> str:
     parts = [
         f"{valid} {counted(len(check.zones), 'zone')} on {significant(check.floor_area)} m², {measured}",
         f"of them measured, {counted(len(check.devices), 'device')}, {days:.3g} days of telemetry every",
-        f"{duration(check.step)}. {100 * usable:.1f} % of its values can be used",
+        f"{duration(check.step)}. {percent(usable)} of its values can be used",
     ]
     text = " ".join(parts) + (f"; {flawed} of {len(check.quality.columns)} columns lack some." if flawed else ".")
     if check.anomalies:

@@ -60,11 +60,13 @@ def check_means(check: CaseCheck) -> Means:
     if blind:
         trust += f" {blind} of {counted(len(check.zones), 'zone')} have no "
         trust += "temperature sensor: nothing checks the model there."
+    if not any("irradiance" in point.point for point in check.points):
+        trust += " The sun is not measured: what it does can only be estimated."
     if days < _FEW_DAYS:
         trust += " That is little: a week or more of varied weather makes a model that can be relied on."
     first = [*errors, *check.anomalies]
     advice = f"{first[0].advice[:1].upper()}{first[0].advice[1:]}." if first else ""
-    further = "Then run the check again." if errors else "Next step: buildingmpc calibrate."
+    further = "Then run the check again." if errors else "Next step: fit a model, buildingmpc calibrate."
     return Means(answer, trust, f"{advice} {further}".strip())
 
 

@@ -38,11 +38,11 @@ def diagnosis_means(result: Diagnosis) -> Means:
         trust = f"The gap is real ({kelvin(result.gap)} degrees C where {kelvin(result.floor)} should be possible); "
         trust += f"its cause is not known. The best guess, {called(best.effect)}, has {sure(best.probability)}."
         advice = CATALOGUE[best.effect].separated_by if best.effect in CATALOGUE else ""
-        return Means(answer, trust, f"Measure before you change anything. {_sentence(advice)}".strip())
+        return Means(answer, trust, f"Measure before you change anything. Look at: {advice}." if advice else "Measure before you change anything.")
     effects = [(r.screened.effect, r.screened.zones) for r in found]
     told = listed([f"{called(e, z)}" for e, z in effects])
     likely = rivals(result, effects[0][0])
-    answer = f"What the plain model lacks: {told}."
+    answer = f"The plain model lacks {told}."
     if len(likely) > 1:
         answer = f"The model lacks one of these, which look alike in the data: {listed(map(called, likely), 'or')}."
     chance = sure(candidate(result, effects[0][0]).probability)
@@ -54,7 +54,8 @@ def diagnosis_means(result: Diagnosis) -> Means:
     elif last is not None:
         trust += " But on days that it had not seen the error does not fall, so do not rely on it yet."
     advice = CATALOGUE[effects[0][0]].separated_by if effects[0][0] in CATALOGUE else ""
-    return Means(answer, trust, f"To be sure: {advice}." if advice else "The model with it is in calibration.json.")
+    use = "Use the model that has it, calibration.json, to predict and to control (buildingmpc compare)."
+    return Means(answer, trust, f"{use} To be sure of the cause, look at: {advice}." if advice else use)
 
 
 def experiment_means(found: Experiment, outcome: Outcome | None) -> Means:
@@ -77,7 +78,7 @@ def experiment_means(found: Experiment, outcome: Outcome | None) -> Means:
         return Means(f"It was carried out and does not say whether it is {names}.", "The evidence is too weak.", then)
     if found.verdict == "hopeless":
         return Means(f"No change of setpoints would tell whether it is {names}.",
-                     f"The best of {found.tried} plans has a chance of {percent(found.chance)}.",
+                     f"Of {found.tried} plans the best would tell with a chance of {percent(found.chance)}, by the model.",
                      f"Measure instead: {'; or '.join(found.instead)}.")  # fmt: skip
     worst = float(found.best.discomfort.max())
     answer = f"{found.schedule.hours:.3g} hours of planned setpoints can tell whether it is {names}."
@@ -101,12 +102,13 @@ def monitoring_means(found: Monitoring) -> Means:
     if not found.events:
         return Means("The building behaves as it did.", trust, "Nothing to do; run it again in a week.")
     shown = lasting[-1] if lasting else found.events[-1]
-    since = f"{found.date(shown.since):%d %B %Y}"
+    date = found.date(shown.since)
+    since = f"{date.day} {date:%B %Y}"
     over = "" if lasting else " It is over by now."
     answer = f"The building has changed since {since}: {called(shown.effect)}, {in_zones(shown.zones)}.{over}"
     trust += f" That it is this cause is {sure(shown.probability)} sure."
     advice = CATALOGUE[shown.effect].separated_by if shown.effect in CATALOGUE else ""
-    then = f"Ask what was done there at that time. To be sure: {advice}." if advice else "Ask what was done there then."
+    then = f"Ask what was done there at that time. To be sure of the cause, look at: {advice}." if advice else "Ask what was done there then."
     return Means(answer, trust, then)
 
 

@@ -276,13 +276,15 @@ def counted(number: int, noun: str) -> str:
 
 
 def percent(value: float) -> str:
-    """Spell a share: without decimals, but for what would be 0.
+    """Spell a share: without decimals, but for what would be 0, and never as all where a part is lacking.
 
     Examples
     --------
-    >>> percent(0.256), percent(-0.031), percent(0.004)
-    ('26 %', '−3 %', '0.4 %')
+    >>> percent(0.256), percent(-0.031), percent(0.004), percent(0.9996)
+    ('26 %', '−3 %', '0.4 %', 'over 99 %')
     """
+    if 0.995 <= value < 1.0 - 1e-9:
+        return "over 99 %"
     digits = 1 if 0.0 < abs(value) < 0.005 else 0
     return f"{100 * value:.{digits}f} %".replace("-", "−")
 

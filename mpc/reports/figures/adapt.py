@@ -118,9 +118,10 @@ def for_phone(figure: Figure) -> None:
             elif axis is axes.xaxis and isinstance(axis.get_major_formatter(), ScalarFormatter):
                 axis.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 3, 5, 6, 10]))
             axis.label.set_text(textwrap.fill(axis.label.get_text(), _TITLE if axis is axes.xaxis else _TITLE // 2))
-        rows = axes.yaxis.get_major_formatter()
-        if isinstance(rows, FixedFormatter):
-            rows.seq = [textwrap.fill(str(label), _ROW) for label in rows.seq]
+        for axis, length in ((axes.yaxis, _ROW), (axes.xaxis, _ROW // 2)):
+            marks = axis.get_major_formatter()
+            if isinstance(marks, FixedFormatter):
+                marks.seq = [textwrap.fill(str(label), length) for label in marks.seq]
         title = textwrap.fill(axes.get_title(loc="left"), _TITLE)
         legend, pad = axes.get_legend(), 6.0
         if legend is not None and _is_beside(legend, axes):
@@ -132,8 +133,11 @@ def for_phone(figure: Figure) -> None:
             pad += 13.0 * -(-len(names) // columns)
         if title:
             axes.set_title(title, loc="left", pad=pad)
-    for legend in figure.legends:
-        legend.set_ncols(_columns([text.get_text() for text in legend.get_texts()]))
+    for legend in list(figure.legends):
+        names = [text.get_text() for text in legend.get_texts()]
+        legend.remove()
+        figure.legend(legend.legend_handles, names, loc="outside lower center", ncols=_columns(names), fontsize=8,  # type: ignore[arg-type]
+                      columnspacing=1.0, handlelength=1.4)  # fmt: skip
 
 
 def _is_beside(legend: Legend, axes: Axes) -> bool:
