@@ -40,7 +40,7 @@ _USAGE: Any = typer.BadParameter.__base__
 
 #: What a message says to a caller of the Python function, in brackets behind the option of the command. What is in
 #: brackets elsewhere may be part of a path.
-_KEYWORD = re.compile(r"( --[a-z-]+(?: \w+)?) \(\w+=[\w']+\)")
+_KEYWORD = re.compile(r"( --[a-z-]+(?: [\w:]+)?) \(\w+=[\w']+\)")
 
 _settings: dict[str, Any] = {"debug": False, "plugins": []}
 

@@ -211,7 +211,7 @@ def trajectory(run: ControlRun) -> pd.DataFrame:
 
 
 def _unit_of(name: str, currency: str) -> str:
-    """Unit of a column of the course."""
+    """Give the unit of a column of the course."""
     if name.endswith("_price"):
         return f"{currency}/kWh"
     if name in ("true/electricity", "true/gas"):

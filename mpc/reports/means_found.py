@@ -38,7 +38,8 @@ def diagnosis_means(result: Diagnosis) -> Means:
         trust = f"The gap is real ({kelvin(result.gap)} degrees C where {kelvin(result.floor)} should be possible); "
         trust += f"its cause is not known. The best guess, {called(best.effect)}, has {sure(best.probability)}."
         advice = CATALOGUE[best.effect].separated_by if best.effect in CATALOGUE else ""
-        return Means(answer, trust, f"Measure before you change anything. Look at: {advice}." if advice else "Measure before you change anything.")
+        first = "Measure before you change anything."
+        return Means(answer, trust, f"{first} Look at: {advice}." if advice else first)
     effects = [(r.screened.effect, r.screened.zones) for r in found]
     told = listed([f"{called(e, z)}" for e, z in effects])
     likely = rivals(result, effects[0][0])
@@ -78,7 +79,7 @@ def experiment_means(found: Experiment, outcome: Outcome | None) -> Means:
         return Means(f"It was carried out and does not say whether it is {names}.", "The evidence is too weak.", then)
     if found.verdict == "hopeless":
         return Means(f"No change of setpoints would tell whether it is {names}.",
-                     f"Of {found.tried} plans the best would tell with a chance of {percent(found.chance)}, by the model.",
+                     f"Of {found.tried} plans the best would tell with a chance of {percent(found.chance)}.",
                      f"Measure instead: {'; or '.join(found.instead)}.")  # fmt: skip
     worst = float(found.best.discomfort.max())
     answer = f"{found.schedule.hours:.3g} hours of planned setpoints can tell whether it is {names}."
@@ -108,7 +109,8 @@ def monitoring_means(found: Monitoring) -> Means:
     answer = f"The building has changed since {since}: {called(shown.effect)}, {in_zones(shown.zones)}.{over}"
     trust += f" That it is this cause is {sure(shown.probability)} sure."
     advice = CATALOGUE[shown.effect].separated_by if shown.effect in CATALOGUE else ""
-    then = f"Ask what was done there at that time. To be sure of the cause, look at: {advice}." if advice else "Ask what was done there then."
+    then = "Ask what was done there at that time."
+    then += f" To be sure of the cause, look at: {advice}." if advice else ""
     return Means(answer, trust, then)
 
 

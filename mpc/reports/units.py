@@ -55,7 +55,7 @@ _TABLE, _ROW = re.compile(r"<table>.*?</table>", re.DOTALL), re.compile(r"<tr>.*
 _CELL = re.compile(r"(<t([hd])\b[^>]*>)(.*?)(</t[hd]>)", re.DOTALL)
 
 
-class _Line(NamedTuple):
+class Line(NamedTuple):
     """Conversion along a straight line, and the unit that it leads to.
 
     Parameters
@@ -71,11 +71,18 @@ class _Line(NamedTuple):
     unit: str
 
     def __call__(self, value: float) -> float:
+        """Convert a value, or an array of them.
+
+        Parameters
+        ----------
+        value : float
+            In the first unit.
+        """
         return self.scale * value + self.offset
 
 
 @cache
-def inch_pound(unit: str) -> _Line | None:
+def inch_pound(unit: str) -> Line | None:
     """Find the inch-pound unit that a unit is read in, and how values are converted.
 
     Parameters
@@ -101,7 +108,7 @@ def inch_pound(unit: str) -> _Line | None:
     registry: UnitRegistry = _registry()
     _, own, other, spelled = found
     zero, one = (float(registry.Quantity(x, own).to(other).magnitude) for x in (0.0, 1.0))
-    return _Line(one - zero, round(zero, 9), spelled)
+    return Line(one - zero, round(zero, 9), spelled)
 
 
 @cache

@@ -191,7 +191,8 @@ def make_study(
         believed = model_settings(given.controller_parameters, dx=given.dx)
         model = reduced(believed, ready, given.controller_parameters, given.order)
     system = given.system or size_system(ready)
-    return Study(building.name, scenario, grid.n_steps, system, truth, model, built, given, notes, _weather_words(weather))
+    source = _weather_words(weather)
+    return Study(building.name, scenario, grid.n_steps, system, truth, model, built, given, notes, source)
 
 
 def _weather_words(weather: Weather) -> str:

@@ -2,7 +2,6 @@
 
 import re
 import textwrap
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,10 +10,11 @@ from matplotlib.axis import Axis
 from matplotlib.dates import AutoDateLocator
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
+from matplotlib.text import Text
 from matplotlib.ticker import FixedFormatter, FixedLocator, FuncFormatter, MaxNLocator, ScalarFormatter
 
 from mpc.reports.display import Display
-from mpc.reports.units import NUMBER, converted_number, inch_pound
+from mpc.reports.units import NUMBER, Line, converted_number, inch_pound
 
 #: Width of a figure on a phone [inch]: 374 px, which a screen of 390 px shows at about nine tenths.
 NARROW = 3.9
@@ -54,7 +54,7 @@ class _InUnits(MaxNLocator):
         return (np.asarray(shown) - self._line.offset) / self._line.scale
 
 
-def axis_line(axis: Axis) -> Callable[[Any], Any] | None:
+def axis_line(axis: Axis) -> Line | None:
     """Conversion of the values of an axis to the units that are shown, by the unit in its label; None where it stays.
 
     Parameters
@@ -82,8 +82,7 @@ def in_units(figure: Figure, shown: Display) -> None:
             if line is None:
                 continue
             if isinstance(axis.get_major_formatter(), FixedFormatter):  # of a logarithmic axis: the same ticks
-                ticks = [float(line(tick)) for tick in axis.get_majorticklocs()]
-                axis.set_major_formatter(FixedFormatter([f"{tick:.2g}" for tick in ticks]))
+                axis.set_major_formatter(FixedFormatter([f"{line(tick):.2g}" for tick in axis.get_majorticklocs()]))
             else:
                 if not isinstance(axis.get_major_locator(), FixedLocator):
                     axis.set_major_locator(_InUnits(line))
@@ -92,11 +91,10 @@ def in_units(figure: Figure, shown: Display) -> None:
         for text in axes.texts if lines else ():  # labels of bars and points: numbers of the axis
             if re.fullmatch(NUMBER, text.get_text()):
                 text.set_text(converted_number(text.get_text(), lines[0]))
-    for text in figure.findobj(lambda artist: hasattr(artist, "get_text") and hasattr(artist, "set_text")):
-        if isinstance(text.axes, Axes) and text in (  # type: ignore[attr-defined]
-            *text.axes.get_xticklabels(), *text.axes.get_yticklabels()):  # type: ignore[attr-defined]  # fmt: skip
-            continue
-        text.set_text(shown.text(text.get_text()))  # type: ignore[attr-defined]
+    ticks = {id(mark) for axes in figure.axes for mark in (*axes.get_xticklabels(), *axes.get_yticklabels())}
+    for words in figure.findobj(Text):
+        if isinstance(words, Text) and id(words) not in ticks:
+            words.set_text(shown.text(words.get_text()))
 
 
 def for_phone(figure: Figure) -> None:
@@ -127,8 +125,8 @@ def for_phone(figure: Figure) -> None:
         if legend is not None and _is_beside(legend, axes):
             names = [text.get_text() for text in legend.get_texts()]
             columns = _columns(names)
-            handles = legend.legend_handles
-            axes.legend(handles, names, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, fontsize=8,  # type: ignore[arg-type]
+            handles = [handle for handle in legend.legend_handles if handle is not None]
+            axes.legend(handles, names, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, fontsize=8,
                         borderpad=0.2, columnspacing=1.0, handlelength=1.4)  # fmt: skip
             pad += 13.0 * -(-len(names) // columns)
         if title:
@@ -136,7 +134,8 @@ def for_phone(figure: Figure) -> None:
     for legend in list(figure.legends):
         names = [text.get_text() for text in legend.get_texts()]
         legend.remove()
-        figure.legend(legend.legend_handles, names, loc="outside lower center", ncols=_columns(names), fontsize=8,  # type: ignore[arg-type]
+        handles = [handle for handle in legend.legend_handles if handle is not None]
+        figure.legend(handles, names, loc="outside lower center", ncols=_columns(names), fontsize=8,
                       columnspacing=1.0, handlelength=1.4)  # fmt: skip
 
 

@@ -58,7 +58,8 @@ def course(run: ControlRun) -> list[Picture]:
     power.set(title="What it took", ylabel="power [kW]")
     for one in axes:
         _legend(one, 1.06)
-    return [picture(figure, f"{run.entry.title.capitalize()}: prices, weather, zone temperatures, setpoints and power over time", zoom=True)]
+    alt = f"{run.entry.title.capitalize()}: prices, weather, zone temperatures, setpoints and power over time"
+    return [picture(figure, alt, zoom=True)]
 
 
 def _legend(axes: Axes, beside: float = 1.01) -> None:

@@ -74,9 +74,9 @@ def zoomable(figure: Figure, shown: Display) -> dict[str, Any]:
 
 def _is_twin(first: Axes, other: Axes) -> bool:
     """Whether other axes lie on the first ones, with a scale of their own on the right."""
-    return other.yaxis.get_label_position() == "right" and first.yaxis.get_label_position() == "left" and (
-        first.get_subplotspec() is not None and first.get_subplotspec() == other.get_subplotspec()
-    )  # fmt: skip
+    sides = [str(axes.yaxis.get_label_position()) for axes in (first, other)]
+    own = first.get_subplotspec()
+    return sides == ["left", "right"] and own is not None and own == other.get_subplotspec()
 
 
 def _tail(figure: Figure, axes: Axes) -> str:
@@ -94,32 +94,34 @@ def _traces(axes: Axes, shown: Display, is_time: bool) -> list[dict[str, Any]]:
     zone = getattr(axes.xaxis.get_major_locator(), "tz", None)
 
     def course(values: Any) -> list[float | None]:
-        numbers = np.asarray(values if line is None else line(np.asarray(values, dtype=float)), dtype=float)
+        numbers: Any = np.asarray(values, dtype=float)
+        numbers = numbers if line is None else line(numbers)
         return [float(f"{v:.{_DIGITS}g}") if np.isfinite(v) else None for v in numbers]
 
     def times(values: Any) -> list[Any]:
         if not is_time:
             return course_of(values)
-        return [num2date(v, tz=zone).strftime("%Y-%m-%d %H:%M") for v in np.asarray(values, dtype=float)]
+        stamps = (num2date(v, tz=zone) for v in np.asarray(values, dtype=float))  # type: ignore[no-untyped-call]
+        return [stamp.strftime("%Y-%m-%d %H:%M") for stamp in stamps]
 
     traces = []
     for artist in axes.get_children():
         if isinstance(artist, PolyCollection):
             for path in artist.get_paths():
-                ends = path.vertices
-                colour = to_hex(artist.get_facecolor()[0]) if len(artist.get_facecolor()) else "#888888"
+                ends = np.asarray(path.vertices)
+                colours: Any = artist.get_facecolor()
+                colour = to_hex(colours[0]) if len(colours) else "#888888"
                 traces.append({
                     "type": "scatter", "mode": "lines", "x": times(ends[:, 0]), "y": course(ends[:, 1]),
                     "fill": "toself", "fillcolor": colour, "line": {"width": 0}, "hoverinfo": "skip",
                     "opacity": float(artist.get_alpha() or 1.0), **_named(artist.get_label()),
                 })  # fmt: skip
-        elif isinstance(artist, Line2D) and len(artist.get_xdata()) > 1:
+        elif isinstance(artist, Line2D) and np.size(artist.get_xdata()) > 1:
             x, y = artist.get_data()
             steps = {"steps-pre": "vh", "steps-post": "hv"}.get(str(artist.get_drawstyle()))
             drawn = {"color": to_hex(artist.get_color()), "width": 1.6}
             drawn |= {"dash": _DASHES.get(str(artist.get_linestyle()), "solid")} | ({"shape": steps} if steps else {})
-            straight = artist.get_transform() != axes.transData
-            if not straight:
+            if artist.get_transform() == axes.transData:  # not a straight line across the axes
                 traces.append({"type": "scatter", "mode": "lines", "x": times(x), "y": course(y), "line": drawn,
                                "connectgaps": False, **_named(artist.get_label())})  # fmt: skip
     return traces
@@ -168,4 +170,5 @@ def zoom_scripts(figures: Mapping[str, Any]) -> dict[str, str] | None:
     library = _library()
     if not figures or library is None:
         return None
-    return {"library": library, "figures": _packed(json.dumps(dict(figures), allow_nan=False)), "dark": json.dumps(DARK)}
+    packed = _packed(json.dumps(dict(figures), allow_nan=False))
+    return {"library": library, "figures": packed, "dark": json.dumps(DARK)}
