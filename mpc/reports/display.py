@@ -42,6 +42,8 @@ class Display:
         Whether figures are also written as files of their own.
     table_format : {"parquet", "csv", "xlsx"}
         Format in which tables are written beside Parquet.
+    drawn : list of (str, bytes)
+        Figures that are still to be written, with their titles; filled by whoever draws.
 
     Raises
     ------

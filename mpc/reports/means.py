@@ -153,8 +153,8 @@ def simulation_means(summary: Mapping[str, float]) -> Means:
 
     Parameters
     ----------
-    summary : mapping
-        Of `mpc.reports.case.simulation_summary`.
+    summary : mapping of str to float
+        Of `mpc.reports.case.simulation_summary` [units of its keys].
     """
     length = duration(summary["steps"] * summary["step_seconds"])
     answer = f"Left alone for {length}, the model is {kelvin(summary['mae'])} degrees C off the sensors on average."

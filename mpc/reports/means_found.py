@@ -38,8 +38,8 @@ def diagnosis_means(result: Diagnosis) -> Means:
         trust = f"The gap is real ({kelvin(result.gap)} degrees C where {kelvin(result.floor)} should be possible); "
         trust += f"its cause is not known. The best guess, {called(best.effect)}, has {sure(best.probability)}."
         advice = CATALOGUE[best.effect].separated_by if best.effect in CATALOGUE else ""
-        first = "Measure before you change anything."
-        return Means(answer, trust, f"{first} Look at: {advice}." if advice else first)
+        then = "Measure before you change anything."
+        return Means(answer, trust, f"{then} Look at: {advice}." if advice else then)
     effects = [(r.screened.effect, r.screened.zones) for r in found]
     told = listed([f"{called(e, z)}" for e, z in effects])
     likely = rivals(result, effects[0][0])

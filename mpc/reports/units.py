@@ -4,7 +4,7 @@ import html
 import re
 from collections.abc import Callable
 from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 #: Unit as reports spell it; the same as pint knows it; the unit that it is read in, for pint and as it is spelled.
 #: Electricity and gas stay in kW and kWh, as on American bills; what is given per area is so per square foot.
@@ -100,22 +100,20 @@ def inch_pound(unit: str) -> Line | None:
     >>> inch_pound("°C")(20.0), inch_pound("K").unit, inch_pound("kWh") is None
     (68.0, '°F', True)
     """
-    from pint import UnitRegistry
-
     found = next((u for u in _UNITS if u[0] == unit), None)
     if found is None:
         return None
-    registry: UnitRegistry = _registry()
+    registry = _registry()
     _, own, other, spelled = found
     zero, one = (float(registry.Quantity(x, own).to(other).magnitude) for x in (0.0, 1.0))
-    return Line(one - zero, round(zero, 9), spelled)
+    return Line(round(one - zero, 12), round(zero, 9), spelled)
 
 
 @cache
-def _registry() -> object:
+def _registry() -> Any:
     from pint import UnitRegistry  # here: its table takes 0.3 s to read
 
-    registry: UnitRegistry = UnitRegistry()
+    registry: Any = UnitRegistry()
     registry.define("inch_H2O_60F = 248.84 * pascal")  # ASHRAE Fundamentals 2017, ch. 39, table 2
     return registry
 
@@ -148,19 +146,19 @@ def converted_text(text: str) -> str:
     return _IN_BRACKETS.sub(bracket, _QUANTITY.sub(quantity, text))
 
 
-def converted_number(text: str, line: Callable[[float], float]) -> str:
+def converted_number(text: str, line: Line) -> str:
     """Write a number in another unit, with as many significant digits and at least two.
 
     Parameters
     ----------
     text : str
         As reports spell it.
-    line : callable
+    line : Line
         Of `inch_pound`.
     """
     sign, digits = re.fullmatch(r"([+\-−±]?)(.*)", text, re.DOTALL).groups()  # type: ignore[union-attr]
     plain = digits.replace(" ", "").replace("\u202f", "")
-    about = sign == "±" and getattr(line, "offset", 0.0)
+    about = sign == "±" and line.offset != 0.0
     value = float(plain) * (-1.0 if sign in ("-", "−") else 1.0)
     found = line(value) - (line(0.0) if about else 0.0)
     mantissa = plain.partition("e")[0]
@@ -171,7 +169,7 @@ def converted_number(text: str, line: Callable[[float], float]) -> str:
     if "e" in plain:
         return f"{found:.{known - 1}e}".replace("-", "−", 1) if found < 0 else f"{found:.{known - 1}e}"
     places = known - len(str(int(abs(found)))) if abs(found) >= 1.0 else known + len(_zeros(found))
-    if getattr(line, "offset", 0.0) and not about:  # a temperature has no zero that digits could count from
+    if line.offset and not about:  # a temperature has no zero that digits could count from
         places = decimals
     rounded = round(found, places)
     spelled = f"{abs(rounded):,.{max(0, places)}f}".replace(",", " ")
