@@ -116,6 +116,7 @@ def run_calibration(
 def _show(result: CalibrationResult) -> None:
     """Write what a calibration found to stdout."""
     from mpc.reports.calibration import calibration_verdict
+    from mpc.reports.page import unit
 
     say(calibration_verdict(result))
     rows = []
@@ -128,7 +129,7 @@ def _show(result: CalibrationResult) -> None:
     show_table(f"Error {result.horizon} ahead", {"": "", **errors}, rows)
     columns = {"parameter": "", "value": ".4g", "standard error": ".2g", "unit": "", "lower": ".4g", "upper": ".4g"}
     estimates = [
-        (p.name, p.value, p.standard_error, p.unit, p.lower, p.upper,
+        (p.name, p.value, p.standard_error, unit(p.unit), p.lower, p.upper,
          "on a bound" if p.at_bound else "yes" if p.identifiable else "no")
         for p in result.parameters
         if p.standard_error is not None

@@ -107,12 +107,11 @@ def show_table(
 
     listed, shown = list(rows), display()
     table = Table(box=SIMPLE_HEAD, pad_edge=False)
-    heads = [shown.column(name) for name in columns]
-    for (name, _), spelled in zip(heads, columns.values(), strict=True):
-        table.add_column(name, justify="right" if spelled else "left", overflow="fold")
+    for name, spelled in columns.items():
+        table.add_column(shown.text(name), justify="right" if spelled else "left", overflow="fold")
     for row in listed[:MOST_ROWS]:
         cells = [_cell(value, spelled) for value, spelled in zip(row, columns.values(), strict=True)]
-        table.add_row(*(shown.text(change(cell)) for (_, change), cell in zip(heads, cells, strict=True)))
+        table.add_row(*shown.row(list(columns), cells))
     out = _console()
     out.print(Text(f"\n{shown.text(title)}", style="bold"))
     out.print(table)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mpc.errors import MpcError
-from mpc.reports.units import converted_column, converted_page, converted_text
+from mpc.reports.units import converted_page, converted_row, converted_text
 from thermal.errors import MissingExtraError
 
 if TYPE_CHECKING:  # `buildingmpc doctor` shows tables where half of the packages are missing
@@ -87,15 +87,19 @@ class Display:
         """
         return converted_text(text) if self.converts else text
 
-    def column(self, title: str) -> tuple[str, Callable[[str], str]]:
-        """Head of a column in the units that are shown, and what its cells become.
+    def row(self, titles: Sequence[str], cells: Sequence[str]) -> list[str]:
+        """Cells of a row in the units that are shown: by the heads of their columns, by a cell ``unit``, in sentences.
 
         Parameters
         ----------
-        title : str
-            With its SI unit in brackets.
+        titles : sequence of str
+            Heads of the columns, with their SI units in brackets where all rows have the same.
+        cells : sequence of str
+            In SI units.
         """
-        return converted_column(title) if self.converts else (title, lambda cell: cell)
+        if not self.converts:
+            return list(cells)
+        return converted_row(titles, cells)
 
     def page(self, page: str) -> str:
         """Write a page in the units that are shown.

@@ -48,7 +48,7 @@ def diagnosis_means(result: Diagnosis) -> Means:
         answer = f"The model lacks one of these, which look alike in the data: {listed(map(called, likely), 'or')}."
     chance = sure(candidate(result, effects[0][0]).probability)
     last = result.steps[-1] if result.steps else None
-    trust = f"The first is {chance} sure."
+    trust = f"{'It' if len(found) == 1 else 'The first'} is {chance} sure."
     if last is not None and last.after < last.before:
         trust += f" On days that it had not seen, the model's error falls from {kelvin(last.before)} to "
         trust += f"{kelvin(last.after)} degrees C with it."

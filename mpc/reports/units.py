@@ -2,7 +2,7 @@
 
 import html
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -47,6 +47,8 @@ _NAMES = "|".join(re.escape(name) for name in sorted((u[0] for u in _UNITS), key
 _QUANTITY = re.compile(
     rf"(?<![\w.:/\-])({NUMBER}(?:(?: to | and | or | ± | → )[+\-−]?{NUMBER})*)([ \u00a0])({_NAMES})(?![\w/²³·°^*])"
 )
+#: Cells of numbers: one, or the ends of a range.
+_ALONE = re.compile(rf"{NUMBER}(?: to {NUMBER})?")
 _IN_BRACKETS = re.compile(rf"\[(%?)({_NAMES})\]")
 
 #: Parts of a page that no reader sees as text, or that are to be copied as they stand.
@@ -181,24 +183,33 @@ def _zeros(value: float) -> str:
     return re.match(r"0*", f"{abs(value):.12f}"[2:])[0]  # type: ignore[index]
 
 
-def converted_column(title: str) -> tuple[str, Callable[[str], str]]:
-    """Head of a column in inch-pound units, and what its cells become.
+def converted_row(titles: Sequence[str], cells: Sequence[str]) -> list[str]:
+    """Cells of a row in inch-pound units: by the unit in the head of a column, by a cell of a column ``unit``, in text.
 
     Parameters
     ----------
-    title : str
-        With its unit in brackets, where it has one.
+    titles : sequence of str
+        Heads of the columns in SI units.
+    cells : sequence of str
+        Under them.
 
-    Returns
-    -------
-    tuple of str and callable
-        The new title, and what takes a cell's text to another.
+    Examples
+    --------
+    >>> converted_row(["zone", "unit", "value", "error [K]"], ["A", "W", "100", "0.50"])
+    ['A', 'Btu/h', '340', '0.90']
     """
-    found = _IN_BRACKETS.search(title)
-    line = inch_pound(found[2]) if found else None
-    if line is None:
-        return title, lambda cell: cell
-    return converted_text(title), lambda cell: re.sub(NUMBER, lambda m: converted_number(m[0], line), cell)
+    units = [inch_pound(cell) for title, cell in zip(titles, cells, strict=False) if title == "unit"]
+    of_row, found = (units[0] if units else None), []
+    for k, (title, cell) in enumerate(zip(titles, cells, strict=False)):
+        head = _IN_BRACKETS.search(title)
+        line = inch_pound(head[2]) if head else None if "[" in title or k == 0 else of_row  # first are names
+        if title == "unit" and of_row is not None:
+            found.append(of_row.unit)
+        elif line is not None and (head or _ALONE.fullmatch(cell)):
+            found.append(re.sub(NUMBER, lambda m, line=line: converted_number(m[0], line), cell))  # type: ignore[misc]
+        else:
+            found.append(converted_text(cell))
+    return found
 
 
 def converted_page(page: str) -> str:
@@ -221,22 +232,18 @@ def _unescaped(text: str, change: Callable[[str], str]) -> str:
 
 def _converted_table(table: str) -> str:
     heads = next((_CELL.findall(row) for row in _ROW.findall(table.partition("</thead>")[0])), [])
-    columns = [converted_column(html.unescape(re.sub("<[^>]*>", " ", head[2])))[1] for head in heads]
+    titles = [html.unescape(" ".join(re.sub("<[^>]*>", " ", text).split())) for _, _, text, _ in heads]
 
     def row(match: re.Match[str]) -> str:
         cells = _CELL.findall(match[0])
-        own = next((inch_pound(html.unescape(text)) for tag, _, text, _ in cells if 'class="unit"' in tag), None)
-        written = []
-        for k, (begin, kind, text, end) in enumerate(cells):
-            change = columns[k] if k < len(columns) and kind == "d" else None
-            counted = k < len(heads) and "[" in heads[k][2]  # has a unit of its own, such as per cent
-            if own is not None and 'class="n"' in begin and not counted:
-                text = re.sub(NUMBER, lambda m, line=own: converted_number(m[0], line), text)  # type: ignore[misc]
-            elif own is not None and 'class="unit"' in begin:
-                text = own.unit
-            elif change is not None and "<" not in text:
-                text = _unescaped(text, change)
-            written.append(begin + text + end)
-        return f"<tr>{''.join(written)}</tr>"
+        if any(kind == "h" for _, kind, _, _ in cells):  # heads are text, as those at the side are
+            return match[0]
+        texts = [html.unescape(text) for _, _, text, _ in cells]
+        named = [*titles, *[""] * len(cells)][: len(cells)]
+        changed = zip(cells, texts, converted_row(named, texts), strict=True)
+        return "<tr>" + "".join(
+            begin + (text if after == before or "<" in text else html.escape(after)) + end
+            for (begin, _, text, end), before, after in changed
+        ) + "</tr>"  # fmt: skip
 
     return _ROW.sub(row, table)

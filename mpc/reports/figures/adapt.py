@@ -11,7 +11,7 @@ from matplotlib.dates import AutoDateLocator
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.text import Text
-from matplotlib.ticker import FixedFormatter, FixedLocator, FuncFormatter, MaxNLocator, ScalarFormatter
+from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, ScalarFormatter
 
 from mpc.reports.display import Display
 from mpc.reports.units import NUMBER, Line, converted_number, inch_pound
@@ -81,12 +81,13 @@ def in_units(figure: Figure, shown: Display) -> None:
             line = axis_line(axis)
             if line is None:
                 continue
-            if isinstance(axis.get_major_formatter(), FixedFormatter):  # of a logarithmic axis: the same ticks
-                axis.set_major_formatter(FixedFormatter([f"{line(tick):.2g}" for tick in axis.get_majorticklocs()]))
-            else:
-                if not isinstance(axis.get_major_locator(), FixedLocator):
-                    axis.set_major_locator(_InUnits(line))
-                axis.set_major_formatter(FuncFormatter(lambda x, _, line=line: f"{line(x):.6g}".replace("-", "−")))
+            fixed = isinstance(axis.get_major_locator(), FixedLocator)  # on a logarithmic axis the same ticks stay
+            if not fixed:
+                axis.set_major_locator(_InUnits(line))
+            digits = 2 if fixed else 6
+            axis.set_major_formatter(
+                FuncFormatter(lambda x, _, line=line, n=digits: f"{line(x):.{n}g}".replace("-", "−"))  # type: ignore[misc]
+            )
         lines = [line for line in map(axis_line, (axes.yaxis, axes.xaxis)) if line is not None]
         for text in axes.texts if lines else ():  # labels of bars and points: numbers of the axis
             if re.fullmatch(NUMBER, text.get_text()):
@@ -117,9 +118,10 @@ def for_phone(figure: Figure) -> None:
                 axis.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 3, 5, 6, 10]))
             axis.label.set_text(textwrap.fill(axis.label.get_text(), _TITLE if axis is axes.xaxis else _TITLE // 2))
         for axis, length in ((axes.yaxis, _ROW), (axes.xaxis, _ROW // 2)):
-            marks = axis.get_major_formatter()
-            if isinstance(marks, FixedFormatter):
-                marks.seq = [textwrap.fill(str(label), length) for label in marks.seq]
+            if isinstance(axis.get_major_locator(), FixedLocator):
+                marks = [mark.get_text() for mark in axis.get_majorticklabels()]
+                if max(map(len, marks), default=0) > length:
+                    axis.set_ticks(axis.get_majorticklocs(), [textwrap.fill(mark, length) for mark in marks])
         title = textwrap.fill(axes.get_title(loc="left"), _TITLE)
         legend, pad = axes.get_legend(), 6.0
         if legend is not None and _is_beside(legend, axes):

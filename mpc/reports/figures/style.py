@@ -15,6 +15,7 @@ import pandas as pd
 from matplotlib import dates
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from mpc.reports.display import Display, display
@@ -30,6 +31,9 @@ MEASURED, SIMULATED, WARNING, MUTED, INK = "#0072B2", "#D55E00", "#C00028", "#8A
 
 #: Text on a light colour, which stays dark on a dark page too.
 INK_ON_COLOUR = "#22262C"
+
+#: Areas with more corners than this are painted as pixels, which keeps pages of long runs small.
+_MOST_CORNERS = 3000
 
 #: Zero of the Celsius scale [K].
 CELSIUS = 273.15
@@ -106,6 +110,8 @@ def picture(figure: Figure, alt: str, *, zoom: bool = False, phone: bool = True)
         Whether it may be laid out anew for a phone; a map, whose text fits its rooms, may not.
     """
     shown = display()
+    for area in figure.findobj(PolyCollection):
+        area.set_rasterized(sum(len(path.vertices) for path in area.get_paths()) > _MOST_CORNERS)  # type: ignore[attr-defined]
     interactive = None
     if zoom:
         figure.draw_without_rendering()

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from mpc.reports.units import (
-    converted_column,
     converted_number,
     converted_page,
+    converted_row,
     converted_text,
     inch_pound,
 )
@@ -56,10 +56,16 @@ def test_a_number_keeps_its_significant_digits() -> None:
 
 
 def test_columns_go_by_their_heads() -> None:
-    head, change = converted_column("discomfort [K h]")
-    assert head == "discomfort [°F h]" and change("1.33") == "2.39" and change("–") == "–"
-    head, change = converted_column("saved [%]")
-    assert head == "saved [%]" and change("12") == "12"
+    titles = ["controller", "discomfort [K h]", "saved [%]", "lasts"]
+    assert converted_row(titles, ["rule 2", "1.33", "12", "3 days"]) == ["rule 2", "2.39", "12", "3 days"]
+    assert converted_row(titles, ["a", "–", "–", "0.5 K"]) == ["a", "–", "–", "0.90 °F"]
+
+
+def test_rows_go_by_their_unit() -> None:
+    titles = ["point", "unit", "lowest", "90 % interval", "usable [%]", "told"]
+    row = ["2", "degC", "20.0", "10 to 30", "99.0", "yes"]
+    assert converted_row(titles, row) == ["2", "°F", "68.0", "50 to 86", "99.0", "yes"]
+    assert converted_row(titles, ["n", "%", "20", "–", "99.0", "no"]) == ["n", "%", "20", "–", "99.0", "no"]
 
 
 def test_pages_by_head_by_unit_cell_and_in_text() -> None:
