@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
-from calibration.evaluation.n_step import Progress
 from calibration.fit.ladder import emitter_of
 from calibration.fit.left_out import Known
+from calibration.progress import Progress
 
 
 def fit_baseline(

@@ -23,10 +23,11 @@ from calibration.diagnosis.screen.regular import Regular
 from calibration.diagnosis.seek import answer_entries, seek
 from calibration.estimation.disturbance import DisturbanceModel
 from calibration.evaluation.intervals import Interval
-from calibration.evaluation.n_step import Evaluation, Progress
+from calibration.evaluation.n_step import Evaluation
 from calibration.evaluation.settings import ModelSettings
 from calibration.fit.ladder import ADVANCE
 from calibration.fit.result import CalibrationResult, Rung, SolverReport
+from calibration.progress import Forward, Progress
 from calibration.results import Axes, Result, plain
 from thermal.case.case import Case
 from thermal.case.estimated import Estimated, estimate_entry
@@ -308,19 +309,20 @@ def diagnose(
     >>> diagnose(load_bundled_case(), dx=1.0).verdict.candidates[0].effect
     'solar_gain'
     """
-    began = time.perf_counter()
+    began, whole = time.perf_counter(), Forward(progress)
     found = seek(
-        case, tune, hold_out, dx=dx, horizon=horizon, known=known, ruled_out=ruled_out, progress=progress
+        case, tune, hold_out, dx=dx, horizon=horizon, known=known, ruled_out=ruled_out,
+        progress=whole.part(0.85),
     )  # fmt: skip
     models, rounds, verdict = found.models, found.rounds, found.verdict
-    rungs, kept, left = found.structures or other_structures(models, rounds[-1].after, progress, ADVANCE)
+    rungs, kept, left = found.structures or other_structures(models, rounds[-1].after, whole.part(0.5), ADVANCE)
     errors, where = rounds[0].held_out, where_it_lies(models, rounds[0].before)
     areas = {name: room.floor_area for name, room in models.anatomy.rooms.items()}
     watts = rounds[0].screening.detectable(accepted_from(rounds[0].own))
     correction = correct(models, rounds[0].before, errors, found.floor) if verdict.name == "unexplained" else None
     rungs, left = with_correction(models, correction, rungs, left)
     taken = correction.fit if correction is not None and rungs[-1].chosen else None
-    better = None if kept is None or taken is not None else replace(kept.result(began, progress), rungs=rungs)
+    better = None if kept is None or taken is not None else replace(kept.result(began, whole.part(0.5)), rungs=rungs)
     prediction, disturbance, factors = judge_handed_on(models, taken or rounds[-1].after, better, left)
     return Diagnosis(
         case=case.building.name, verdict=verdict, where=where, steps=found.steps, gap=errors.mae, floor=found.floor.mae,

@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 
 from calibration.diagnosis.decide.verdict import Candidate, Estimate, Verdict
 from calibration.evaluation.intervals import Interval
-from calibration.evaluation.n_step import Progress
 from calibration.fit.calibrate import calibrate
 from calibration.fit.fitted_case import is_large
+from calibration.progress import Forward, Progress
 from thermal.case.case import Case
 from thermal.case.plausibility.anomaly import Anomaly
 from thermal.case.plausibility.exchanged import exchanged_zones
@@ -141,12 +141,13 @@ def mend(
     """
     if is_large(case.building.zone_names):
         return ()
+    whole = Forward(progress)
     found: list[Fault] = []
     error: Errors | None = None
     tried: set[tuple[str, tuple[str, ...]]] = set()
 
     def errors(of: Case) -> Errors:
-        result = calibrate(of, tune, hold_out, settings={**settings, "climb": True}, progress=progress)
+        result = calibrate(of, tune, hold_out, settings={**settings, "climb": True}, progress=whole.part(0.5))
         left = [r.left_out_mae for r in result.rungs if r.chosen] or [result.calibrated["tuning"].metrics.mae]
         return Errors(left[0], result.calibrated["held_out"].metrics.mae)
 

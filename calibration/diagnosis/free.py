@@ -12,11 +12,11 @@ from calibration.diagnosis.refit.comparison import Effects, ModelComparison
 from calibration.diagnosis.refit.refit import beyond_a_step, held_out
 from calibration.diagnosis.refit.search import Round, search
 from calibration.diagnosis.screen.regular import Regular, regular
-from calibration.evaluation.n_step import Progress
 from calibration.fit.fitted_case import FittedCase, fit_case
 from calibration.fit.ladder import CLOCK
 from calibration.fit.left_out import Known, values_of
 from calibration.fit.result import Rung
+from calibration.progress import Forward, Progress
 from thermal.effects.catalogue import CATALOGUE
 from thermal.network.structure import Structure
 
@@ -164,6 +164,7 @@ def search_free(
         Called with stage, done, total.
     """
     chosen, whole, found = kept.settings, kept.settings.structure, kept.best
+    ahead = Forward(progress)
     said = {*known, *ruled_out}
     attempts: list[tuple[Structure, Effects, str | None]] = [(whole, chosen.effects, None)]
     moved = beyond_a_step(found.problem, found.theta, np.sqrt(np.diag(found.covariance)), _WEATHER)
@@ -182,12 +183,12 @@ def search_free(
         untestable |= reasons_of(known, ruled_out, untestable) | dict.fromkeys(own, "part of the structure")
         testable = [e for e in CATALOGUE if e not in untestable]
         baseline = free.fit({**own, **{e: () for e in known}}, [values_of(found)])
-        rounds = search(free, baseline, held_out(free, baseline), testable, progress)
+        rounds = search(free, baseline, held_out(free, baseline), testable, ahead.part(0.5))
         final = rounds[-1].after
         if sought is None or sought in final.effects:
             break
     if final.effects.keys() != baseline.effects.keys():
         known_fit = Known(final.problem, final.model, final.point)
         further = replace(chosen, structure=structure, effects=dict(final.effects))
-        kept = fit_case(models.case, models.tuned, models.judged, further, progress, known_fit)
+        kept = fit_case(models.case, models.tuned, models.judged, further, ahead.part(1.0), known_fit)
     return Free(free, rounds, untestable, regular(free, final), kept)

@@ -11,13 +11,14 @@ from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.estimation.bands import Forecaster
 from calibration.estimation.disturbance import DisturbanceModel
 from calibration.evaluation.intervals import Interval
-from calibration.evaluation.n_step import Evaluation, EvaluationSettings, Progress
+from calibration.evaluation.n_step import Evaluation, EvaluationSettings
 from calibration.evaluation.simple_models import with_yardsticks
 from calibration.fit.estimate import tune
 from calibration.fit.fitted_case import FittedCase, is_large
 from calibration.fit.ladder import climb_from
 from calibration.fit.left_out import Known, LeftOut, left_out
 from calibration.fit.result import CalibrationResult, Rung, effect_entries
+from calibration.progress import Progress
 
 
 def other_structures(

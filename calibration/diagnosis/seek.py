@@ -19,12 +19,12 @@ from calibration.diagnosis.refit.how_far import Step, how_far
 from calibration.diagnosis.refit.refit import HeldOut, elsewhere, held_out
 from calibration.diagnosis.refit.search import Round, search
 from calibration.evaluation.intervals import Interval
-from calibration.evaluation.n_step import Progress
 from calibration.evaluation.settings import ModelSettings
 from calibration.fit.fitted_case import FittedCase
 from calibration.fit.ladder import ADVANCE
 from calibration.fit.left_out import LeftOut
 from calibration.fit.result import Rung
+from calibration.progress import Forward, Progress
 from calibration.results import plain
 from thermal.case.case import Case
 from thermal.case.plausibility.examine import check_calibratable
@@ -166,30 +166,33 @@ def seek(
     """
     began = time.process_time()
     check_calibratable(case)
-    faults = mend(case, tune, hold_out, {"dx": dx, "horizon": horizon}, progress)
+    whole = Forward(progress)
+    faults = mend(case, tune, hold_out, {"dx": dx, "horizon": horizon}, whole.part(0.1, "telemetry"))
     case = faults[-1].mended if faults else case
     drawn = models = ModelComparison(case, ModelSettings(dx=dx), tune, hold_out, horizon)
     untestable = models.untestable()
     untestable |= reasons_of(known, ruled_out, untestable)
     effects: dict[str, tuple[str, ...]] = {name: () for name in known}
-    models, baseline = fit_baseline(drawn, effects, progress)
+    whole.say("baseline")
+    models, baseline = fit_baseline(drawn, effects, whole.part(0.2, "baseline"))
     first = errors = held_out(models, baseline)
     turns = elsewhere(baseline, first) and models.alternate(baseline.built.inputs)
     if turns:
         # what heaters give their heat by is chosen by days that tune, and these are others now
-        models, baseline = fit_baseline(replace(drawn, tune=models.tuned, hold_out=models.judged), effects, progress)
+        other_days = replace(drawn, tune=models.tuned, hold_out=models.judged)
+        models, baseline = fit_baseline(other_days, effects, whole.part(0.2, "baseline"))
         errors = held_out(models, baseline)
     testable = [e for e in CATALOGUE if e not in untestable]
-    rounds = search(models, baseline, errors, testable, progress)
-    models, rounds = challenge(models, rounds, testable, progress)
+    rounds = search(models, baseline, errors, testable, whole.part(0.5))
+    models, rounds = challenge(models, rounds, testable, whole.part(0.3, "masses by zone"))
     about_drawing = judge(rounds, untestable).name
     structures, free, left_over = None, None, None
     if about_drawing != "no_gap":
         # a drawing that is known to lack what nothing explains has no advance
         advance = 0.0 if about_drawing == "unexplained" else ADVANCE
-        structures = Structures(*other_structures(models, rounds[-1].after, progress, advance))
+        structures = Structures(*other_structures(models, rounds[-1].after, whole.part(0.5), advance))
         if structures.kept is not None and drawing_fails(structures.rungs, structures.kept):  # names make up for it
-            free = search_free(models, structures.kept, known, ruled_out, progress)
+            free = search_free(models, structures.kept, known, ruled_out, whole.part(0.6, "free structure"))
             models, rounds, untestable, left_over = free.models, free.rounds, free.untestable, free.left_over
             structures = structures._replace(kept=free.kept)
     steps, floor = how_far(models, rounds)

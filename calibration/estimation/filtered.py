@@ -14,7 +14,8 @@ from calibration.estimation.gains import TOLERANCE, Covariance
 from calibration.estimation.kalman import Filtered, KalmanFilter
 from calibration.estimation.state_space import StateSpace, state_space
 from calibration.evaluation.intervals import Interval
-from calibration.evaluation.n_step import Evaluation, EvaluationSettings, Progress, Wanted, evaluate_runs
+from calibration.evaluation.n_step import Evaluation, EvaluationSettings, Wanted, evaluate_runs
+from calibration.progress import Progress
 from thermal._types import BoolArray, FloatArray
 from thermal.model.case_replay import LEAST_SPIN_UP, SPIN_UP, Inputs, spin_up
 from thermal.model.matrices import Matrices, SymbolicModel

@@ -13,7 +13,7 @@ from calibration.estimation.kalman import Filtered, KalmanFilter
 from calibration.estimation.smoother import log_likelihood_slopes
 from calibration.estimation.state_space import StateSpace
 from calibration.evaluation.intervals import Interval
-from calibration.evaluation.n_step import Progress
+from calibration.progress import Progress
 from calibration.results import Plain
 from thermal._types import FloatArray
 from thermal.model.case_replay import Inputs

@@ -12,9 +12,10 @@ from calibration.errors import CalibrationError, FilterError, NotEnoughDataError
 from calibration.estimation.bands import Forecaster
 from calibration.estimation.disturbance import DisturbanceModel
 from calibration.evaluation.intervals import Interval, Runs, horizon_steps, merge, select_runs
-from calibration.evaluation.n_step import HORIZONS, Evaluation, EvaluationSettings, Progress, evaluate_model
+from calibration.evaluation.n_step import HORIZONS, Evaluation, EvaluationSettings, evaluate_model
 from calibration.evaluation.settings import ModelSettings, load_parameters, read_settings
 from calibration.evaluation.simple_models import rest_of, with_yardsticks
+from calibration.progress import Progress
 from calibration.results import Plain
 from thermal._types import FloatArray
 from thermal.case.case import Case

@@ -14,6 +14,7 @@ from calibration.errors import HorizonError, NotEnoughDataError
 from calibration.evaluation.carried import Carried
 from calibration.evaluation.intervals import Interval, Runs, horizon_steps, select_runs
 from calibration.evaluation.yardsticks import Yardsticks
+from calibration.progress import Progress
 from calibration.results import Axes, Plain, Result
 from thermal._types import FloatArray
 from thermal.case.estimated import Estimated, estimate_entry
@@ -21,9 +22,6 @@ from thermal.model.case_replay import SPIN_UP, Inputs, free_runs, spin_up
 from thermal.model.matrices import Matrices, SymbolicModel
 from thermal.model.step import IMPLICIT_EULER, Scheme
 from thermal.network.network import ThermalNetwork
-
-#: Called with what is being done, how much is done and how much there is.
-Progress = Callable[[str, int, int], None]
 
 #: Horizons reported beside the main one.
 HORIZONS = ("5min", "1h", "3h", "6h", "24h")

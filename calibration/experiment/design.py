@@ -10,7 +10,6 @@ import pandas as pd
 from calibration.diagnosis.refit.comparison import ModelComparison
 from calibration.errors import CalibrationError
 from calibration.evaluation.intervals import Interval
-from calibration.evaluation.n_step import Progress
 from calibration.evaluation.settings import ModelSettings
 from calibration.experiment.days import begin_of, days_like
 from calibration.experiment.emulate import Emulated, Emulator
@@ -28,6 +27,7 @@ from calibration.experiment.library import (
 from calibration.experiment.members import Member, Question, comparison, fit_members
 from calibration.experiment.odds import CHANCE, ODDS, Separation, chance_of, needed, seen_before, separation
 from calibration.experiment.schedule import STATIC_PRESSURE, SUPPLY_AIR, Move, Schedule
+from calibration.progress import Progress
 from calibration.results import plain
 from thermal._types import FloatArray
 from thermal.case.case import Case

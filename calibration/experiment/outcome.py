@@ -13,10 +13,10 @@ from calibration.diagnosis.decide.verdict import Candidate, Verdict
 from calibration.diagnosis.diagnosis import Diagnosis, diagnose
 from calibration.errors import CalibrationError
 from calibration.evaluation.intervals import Interval
-from calibration.evaluation.n_step import Progress
 from calibration.evaluation.settings import ModelSettings
 from calibration.experiment.members import Question, comparison, fit_members, without
 from calibration.experiment.odds import ODDS, needed
+from calibration.progress import Progress
 from thermal.case.case import Case
 
 

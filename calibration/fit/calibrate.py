@@ -6,12 +6,12 @@ from dataclasses import replace
 from typing import Any
 
 from calibration.evaluation.intervals import Interval
-from calibration.evaluation.n_step import Progress
 from calibration.evaluation.settings import ModelSettings, calibration_settings
 from calibration.evaluation.simple_models import with_yardsticks
 from calibration.fit.fitted_case import FittedCase, fit_case
 from calibration.fit.ladder import climb
 from calibration.fit.result import CalibrationResult
+from calibration.progress import Forward, Progress
 from thermal.case.case import Case
 from thermal.case.plausibility.examine import check_calibratable
 
@@ -64,8 +64,11 @@ def calibrate(
     """
     began, chosen = time.perf_counter(), calibration_settings(settings)
     check_calibratable(case)
-    fitted = fit_case(case, tune, hold_out, chosen, progress)
-    result = climb(fitted, began, progress) if chosen.climb else fitted.result(began, progress)
+    whole = Forward(progress)
+    fitted = fit_case(case, tune, hold_out, chosen, whole.part(0.5))
+    rest = whole.part(0.95)
+    result = climb(fitted, began, rest) if chosen.climb else fitted.result(began, rest)
+    whole.say("simple models beside it" if chosen.yardsticks else "done")
     return _beside_simple_models(result, fitted) if chosen.yardsticks else result
 
 

@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 
 from calibration.errors import CalibrationError, NotEnoughDataError
 from calibration.evaluation.intervals import Interval, horizon_steps, merge
-from calibration.evaluation.n_step import Evaluation, Progress
+from calibration.evaluation.n_step import Evaluation
 from calibration.evaluation.settings import INTERVALS, CalibrationSettings, ModelSettings, calibration_settings
 from calibration.fit.calibrate import calibrate
 from calibration.fit.least_squares import INTERRUPTED
 from calibration.fit.result import ParameterEstimate
+from calibration.progress import Progress
 from calibration.results import Axes, Plain, Result
 from thermal.case.case import Case
 from thermal.errors import ThermalError

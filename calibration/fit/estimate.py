@@ -9,10 +9,10 @@ import numpy as np
 
 from calibration.estimation.disturbance import DisturbanceModel
 from calibration.estimation.innovations import TuningSettings, air_volumes, tune_disturbance
-from calibration.evaluation.n_step import Progress
 from calibration.fit.least_squares import INTERRUPTED, LeastSquaresResult, solve_damped, solve_least_squares
 from calibration.fit.precision import Precision, precision, unexplained
 from calibration.fit.problem import FIRST_DEVIATION, Problem
+from calibration.progress import Progress, count_iterations
 from thermal._types import FloatArray
 from thermal.model.reduce import ReducedModel, reduced_model
 
@@ -144,13 +144,12 @@ def estimate(
         The best so far, with the solver's status, also after Ctrl-C.
     """
     rounds = _Rounds(problem, model or reduced_model(problem.grid, [problem.theta(z)]), tuner, close)
+    rounds.counted = count_iterations(progress)
     if rounds.large and problem.deviation == FIRST_DEVIATION and not problem.whitened:
         rounds.weigh(problem.theta(z))
     rounds.whiten(problem.theta(z))
     for number in range(ROUNDS):
         z = rounds.solve(z, 1e-2 if number == 0 else 1e-3)
-        if progress is not None:
-            progress("calibrate", number + 1, ROUNDS)
         if rounds.interrupted or (rounds.next_round(z, number) and number):
             break
     return rounds.result(z)
@@ -162,6 +161,7 @@ class _Rounds:
     def __init__(self, problem: Problem, model: ReducedModel, tuner: Tuner | None, close: bool) -> None:
         self.problem, self.model, self.tuner, self.close = problem, model, tuner, close
         self.iterations = self.evaluations = 0
+        self.counted: Callable[[], None] = count_iterations(None)  # told of every evaluation with derivatives
         self.moved, self.settled, self.interrupted = np.inf, False, False
         self.disturbance: DisturbanceModel | None = None
         self.excess, self.retune = 1.0, True
@@ -196,6 +196,7 @@ class _Rounds:
 
         def weighted(x: FloatArray) -> tuple[FloatArray, FloatArray]:
             self.evaluations += 1
+            self.counted()
             return problem.weighted(model, x)
 
         if (self.last is None and not self.close) or problem.whitened:

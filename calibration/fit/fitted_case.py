@@ -9,7 +9,7 @@ from calibration.errors import CalibrationError
 from calibration.estimation.bands import Forecaster
 from calibration.evaluation.case_model import CaseModel
 from calibration.evaluation.intervals import Interval, default_intervals, horizon_steps, select_runs
-from calibration.evaluation.n_step import HORIZONS, Evaluation, EvaluationSettings, Progress
+from calibration.evaluation.n_step import HORIZONS, Evaluation, EvaluationSettings
 from calibration.evaluation.settings import CalibrationSettings
 from calibration.fit.estimate import Estimate
 from calibration.fit.left_out import Fitted, LeftOut, begin_at, left_out
@@ -18,6 +18,7 @@ from calibration.fit.problem import tuning_problem
 from calibration.fit.result import CalibrationResult, SolverReport, describe
 from calibration.fit.starts import STOPPED, solve_starts
 from calibration.identifiability.information import information_of
+from calibration.progress import Forward, Progress
 from thermal.case.case import Case
 from thermal.inputs.normalisation import fit_normalisation
 from thermal.model.matrices import SymbolicModel
@@ -93,8 +94,9 @@ class FittedCase:
         after = replace(
             before, theta=best.theta, source="estimate", disturbance=best.disturbance, band_factors=self._band_factors()
         )
+        whole = Forward(progress)
         quick, check = after.certified(self.judged[0], horizon_steps(chosen.horizon, after.inputs.step), best.model)
-        calibrated = self._evaluated(after, quick, progress)
+        calibrated = self._evaluated(after, quick, whole.part(0.5, "held-out days"))
         seconds, solve = time.perf_counter() - began, best.solve
         network, information = before.grid.network, information_of(best)
         return CalibrationResult(
@@ -104,7 +106,7 @@ class FittedCase:
             theta=best.theta,
             tuning=self.tuned,
             held_out=self.judged,
-            uncalibrated=self.uncalibrated(progress),
+            uncalibrated=self.uncalibrated(whole.part(1.0, "before calibration")),
             calibrated=calibrated,
             solver=SolverReport(
                 "ipopt", solve.status, solve.success, best.iterations, seconds, chosen.starts, self.failures,
@@ -148,10 +150,10 @@ class FittedCase:
         self, model: CaseModel, quick: SymbolicModel, progress: Progress | None
     ) -> dict[str, Evaluation]:
         """Errors on both kinds of interval, at other horizons too where held out."""
-        horizon, errors = self.settings.horizon, {}
+        horizon, errors, whole = self.settings.horizon, {}, Forward(progress)
         for name, part in (("tuning", self.tuned), ("held_out", self.judged)):
             settings = EvaluationSettings(horizon, True, HORIZONS if name == "held_out" else ())
-            errors[name] = model.evaluate(quick, part, settings, progress)
+            errors[name] = model.evaluate(quick, part, settings, whole.part(0.5 if name == "tuning" else 1.0))
         return errors
 
 

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 from calibration.evaluation.intervals import Interval, days_of
-from calibration.evaluation.n_step import Progress
 from calibration.evaluation.settings import CalibrationSettings
 from calibration.fit.fitted_case import FittedCase, fit_case, is_large, with_normalisation
 from calibration.fit.least_squares import INTERRUPTED
 from calibration.fit.left_out import Fitted, Known, LeftOut, begin_at, left_out
 from calibration.fit.problem import tuning_problem
 from calibration.fit.result import CalibrationResult, Rung
+from calibration.progress import Forward, Progress
 from thermal.case.case import Case
 from thermal.case.emitters import Unknown, unknown_heaters
 from thermal.inputs.provider import IRRADIANCE, telemetry_inputs
@@ -39,6 +39,9 @@ _WRONG = 0.5
 #: heat is given by to be fitted [-]: simulated houses with heated floors promise 0.1 to 0.7, those with radiators and
 #: electric heaters up to 0.05 (house trials, nulls of seeds 0, 1, 8, 15 and 20).
 _PROMISED = 0.05
+
+#: Share of the progress that is left which a fit of another structure takes [-]: there are two to five.
+_SHARE = 0.4
 
 #: What heaters of which nobody says it may give their heat by beside the air, that with most parameters first.
 _EMITTERS: tuple[Unknown, Unknown] = ("floor", "radiator")
@@ -67,20 +70,21 @@ def climb(drawn: FittedCase, began: float, progress: Progress | None = None) -> 
     CalibrationResult
         With ``rungs``, the drawing's first; empty where there was no choice, or Ctrl-C ended it.
     """
-    chosen = drawn.settings
+    chosen, whole = drawn.settings, Forward(progress)
     asked = chosen.effects or chosen.scopes or chosen.fixed or chosen.structure != BASELINE
     if asked or is_large(drawn.model.grid.network.zones) or chosen.objective != "multi_step":
         return drawn.result(began, progress)
     try:
         drawn.raise_if_interrupted()
-        rungs, kept, left = climb_from("drawn", drawn.best, drawn, progress)
+        rungs, kept, left = climb_from("drawn", drawn.best, drawn, whole.part(0.6))
     except KeyboardInterrupt:  # what is finished is the drawing's
         stopped = replace(drawn.best.solve, success=False, status=INTERRUPTED, interrupted=True)
-        return replace(drawn, best=replace(drawn.best, solve=stopped)).result(began, progress)
+        return replace(drawn, best=replace(drawn.best, solve=stopped)).result(began, whole.part(1.0))
     if kept is None:
-        return replace(replace(drawn, left=left).result(began, progress), rungs=rungs)
+        return replace(replace(drawn, left=left).result(began, whole.part(1.0)), rungs=rungs)
     # before is what the drawing says
-    return replace(kept.result(began, progress), rungs=rungs, uncalibrated=drawn.uncalibrated(progress))
+    result = kept.result(began, whole.part(0.7))
+    return replace(result, rungs=rungs, uncalibrated=drawn.uncalibrated(whole.part(1.0)))
 
 
 def emitter_of(
@@ -99,7 +103,7 @@ def emitter_of(
     progress : callable, optional
         Called with stage, done, total.
     """
-    ladder = _Ladder(given, progress, replace(given.calibration, starts=1, effects=known))
+    ladder = _Ladder(given, Forward(progress), replace(given.calibration, starts=1, effects=known))
     if is_large(given.case.building.zone_names) or not ladder.guesses:
         return "air"
     looked = [ladder.look("drawn", fitted)]
@@ -164,7 +168,7 @@ def climb_from(
     tuple
         The rungs; what is kept, or None where that is the fitted model; and the days left out by what is kept.
     """
-    ladder = _Ladder(given, progress, replace(given.calibration, starts=1))
+    ladder = _Ladder(given, Forward(progress), replace(given.calibration, starts=1))
     base = ladder.base
     begun: dict[str, tuple[CalibrationSettings, Fitted]] = {}  # structures that are looked at before they are fitted
     source = telemetry_inputs(given.case)
@@ -234,18 +238,19 @@ class _Ladder:
     """What structures are fitted to and looked at with."""
 
     given: Tuned
-    progress: Progress | None
+    progress: Forward
     base: CalibrationSettings
 
     def look(self, name: str, found: Fitted, fit: FittedCase | None = None) -> _Looked:
         """Leave days out."""
+        self.progress.say(f"{name} building, days left out")
         left = left_out(found, self.given.tuned, self.base.spin_up_seconds)
         return _Looked(name, left, len(found.problem.free), fit)
 
     def solve(self, settings: CalibrationSettings, known: Fitted | None = None) -> FittedCase:
         """Fit a structure."""
-        given = self.given
-        found = fit_case(given.case, given.tuned, given.judged, settings, self.progress, known)
+        given, part = self.given, self.progress.part(_SHARE, "another structure")
+        found = fit_case(given.case, given.tuned, given.judged, settings, part, known)
         found.raise_if_interrupted()
         return found
 

@@ -15,7 +15,6 @@ from scipy.stats import chi2, norm, t
 from calibration.errors import CalibrationError
 from calibration.evaluation.case_model import CHECK_TOLERANCE
 from calibration.evaluation.intervals import Interval
-from calibration.evaluation.n_step import Progress
 from calibration.evaluation.settings import INTERVALS, CalibrationSettings, ModelSettings, calibration_settings
 from calibration.fit.calibrate import calibrate
 from calibration.fit.cross_validation import in_order, local_days, run_errors
@@ -23,6 +22,7 @@ from calibration.fit.least_squares import INTERRUPTED
 from calibration.fit.precision import precision
 from calibration.fit.problem import tuning_problem
 from calibration.identifiability.information import InformationSearch, split_jacobian
+from calibration.progress import Progress
 from calibration.results import Axes, Plain, Result, draw_rows, plain
 from thermal._types import FloatArray
 from thermal.case.case import Case

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from calibration.errors import CalibrationError
-from calibration.evaluation.n_step import Progress
 from calibration.fit.estimate import MOST_ZONES, TUNING_ORDER, Estimate, Tuner, estimate, tune
 from calibration.fit.least_squares import solve_least_squares
 from calibration.fit.problem import Problem
+from calibration.progress import Forward, Progress
 from thermal._types import FloatArray
 from thermal.errors import ModelError
 from thermal.model.matrices import SymbolicModel
@@ -104,8 +104,9 @@ def solve_starts(
     best: Estimate | None = None
     failures = []
     draws = draw_starts(problem, max(1, starts - 1), seed)
-    large = len(first.network.zones) > MOST_ZONES
+    large, whole = len(first.network.zones) > MOST_ZONES, Forward(progress)
     for number in range(starts):
+        part = whole.part(1.0 / (starts - number), f"start {number + 1} of {starts}")
         try:
             if number == 1:
                 begun = best.problem if best is not None else problem
@@ -121,7 +122,7 @@ def solve_starts(
                 if explored is None:
                     continue
                 z = explored
-            found = estimate(problem, z, progress, first if number == 0 else None, tuner, close and number == 0)
+            found = estimate(problem, z, part, first if number == 0 else None, tuner, close and number == 0)
         except (ArithmeticError, np.linalg.LinAlgError, CalibrationError, ModelError) as error:
             failures.append(f"start {number + 1}: {error}")
             continue

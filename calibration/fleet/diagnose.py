@@ -8,11 +8,11 @@ from typing import Any
 from calibration.diagnosis.diagnosis import Diagnosis, diagnose
 from calibration.diagnosis.known import reasons_of
 from calibration.errors import CalibrationError
-from calibration.evaluation.n_step import Progress
 from calibration.fleet.case import CaseOutcome
 from calibration.fleet.job import Done, Files, Job
 from calibration.fleet.run import do_many
 from calibration.fleet.settings import Settings, read_intervals, spelled, split_intervals
+from calibration.progress import Progress
 from calibration.results import Content
 from thermal.case.case import Case
 from thermal.errors import nearest

@@ -13,12 +13,12 @@ from pathlib import Path
 from typing import Any
 
 from calibration.errors import CalibrationError, ResultsExistError, WorkerLostError
-from calibration.evaluation.n_step import Progress
 from calibration.fleet.case import RECORD, CaseOutcome, CaseTask, do_one, earlier_outcome
 from calibration.fleet.cluster import ClusterExecutor, killed_worker
 from calibration.fleet.job import Files, Job, calibrated, data_files
 from calibration.fleet.local import LocalProcesses, available_cores
 from calibration.fleet.settings import Settings, check_settings
+from calibration.progress import Progress
 from calibration.results import check_results_folder, to_json
 from thermal.case.load import NAME
 

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from calibration.errors import CalibrationError
 from calibration.evaluation.intervals import Interval
-from calibration.evaluation.n_step import Progress
 from calibration.evaluation.settings import ModelSettings, calibration_settings
 from calibration.fit.problem import FIRST_DEVIATION, Problem, tuning_problem
 from calibration.fit.starts import draw_starts
 from calibration.identifiability.information import DETERMINED, Information, fisher_information, split_jacobian
+from calibration.progress import Progress
 from calibration.results import Axes, Plain, Result, draw_rows
 from thermal._types import FloatArray
 from thermal.case.case import Case

@@ -11,9 +11,9 @@ import pandas as pd
 from scipy.stats import chi2
 
 from calibration.errors import CalibrationError
-from calibration.evaluation.n_step import Progress
 from calibration.fit.estimate import Estimate
 from calibration.fit.least_squares import solve_damped
+from calibration.progress import Progress
 from calibration.results import Axes, Result, plain
 from thermal._types import FloatArray
 from thermal.errors import nearest

@@ -10,10 +10,10 @@ import numpy as np
 import pandas as pd
 
 from calibration.errors import NotEnoughDataError
-from calibration.evaluation.n_step import Progress
 from calibration.monitoring.days import Days
 from calibration.monitoring.filter import DayFilter, Found, State, is_told, noise_of
 from calibration.monitoring.watch import Alarm, Dispersion, Sought, Watch, sought
+from calibration.progress import Progress
 from thermal._types import BoolArray, FloatArray
 
 #: Logarithm of the evidence from which there is an alarm [-]. Were days as the filter says, the mean time between false

@@ -16,7 +16,7 @@ import pandas as pd
 from calibration.diagnosis.refit.comparison import Built, ModelComparison, is_strength
 from calibration.errors import NotEnoughDataError
 from calibration.evaluation.intervals import Interval, Runs, select_runs
-from calibration.evaluation.n_step import Progress
+from calibration.progress import Progress
 from thermal._types import BoolArray, FloatArray, IntArray
 from thermal.effects.catalogue import effect_of
 from thermal.effects.effect import PAIR

@@ -16,10 +16,10 @@ from calibration.diagnosis.known import reasons_of
 from calibration.diagnosis.refit.comparison import ModelComparison
 from calibration.errors import CalibrationError, HorizonError, NotEnoughDataError
 from calibration.evaluation.intervals import Interval, horizon_steps
-from calibration.evaluation.n_step import Progress
 from calibration.evaluation.settings import ModelSettings, load_parameters, read_settings
 from calibration.monitoring.course import Course, Event, follow
 from calibration.monitoring.days import MAY_CHANGE, NO_CAUSE, USUAL, Days, days_of_case
+from calibration.progress import Progress
 from calibration.results import Axes, Result, plain
 from thermal._types import BoolArray
 from thermal.case.case import Case

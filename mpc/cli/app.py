@@ -22,7 +22,7 @@ from mpc.cli.evaluate import check, evaluate, simulate
 from mpc.cli.experiment import experiment
 from mpc.cli.imports import import_devices, import_plan, import_telemetry
 from mpc.cli.monitor import monitor
-from mpc.cli.options import switch, value
+from mpc.cli.options import displaying, switch, value
 from mpc.cli.serve import label, serve
 from mpc.plugins import load_plugins
 from thermal.errors import Described
@@ -40,7 +40,7 @@ _USAGE: Any = typer.BadParameter.__base__
 
 #: What a message says to a caller of the Python function, in brackets behind the option of the command. What is in
 #: brackets elsewhere may be part of a path.
-_KEYWORD = re.compile(r"(?<= --force) \(\w+=True\)")
+_KEYWORD = re.compile(r"( --[a-z-]+(?: [\w:]+)?) \(\w+=[\w']+\)")
 
 _settings: dict[str, Any] = {"debug": False, "plugins": []}
 
@@ -103,7 +103,7 @@ def _report(error: Exception, command: str, json: bool) -> int:
     """Say what went wrong on stderr, and on stdout where JSON is asked for; choose the exit code."""
     if _settings["debug"]:
         traceback.print_exception(error, file=sys.stderr)
-    told = _KEYWORD.sub("", str(error))
+    told = _KEYWORD.sub(r"\1", str(error))
     typer.echo(f"error: {type(error).__name__}: {told}", err=True)
     code = BAD_INPUT if isinstance(error, Described) else FAILURE
     if json:
@@ -113,11 +113,13 @@ def _report(error: Exception, command: str, json: bool) -> int:
     return code
 
 
+_REPORTING = (demo, check, simulate, evaluate, calibrate, diagnose, experiment, monitor, control, compare)
+
 for _command in (
     *(demo, doctor, check, import_plan, import_devices, import_telemetry, label),
     *(simulate, evaluate, calibrate, diagnose, experiment, monitor, effects, control, compare, serve),
 ):
-    app.command()(_guarded(_command))
+    app.command()(_guarded(displaying(_command) if _command in _REPORTING else _command))
 
 
 def main() -> None:

@@ -116,6 +116,7 @@ def run_calibration(
 def _show(result: CalibrationResult) -> None:
     """Write what a calibration found to stdout."""
     from mpc.reports.calibration import calibration_verdict
+    from mpc.reports.page import unit
 
     say(calibration_verdict(result))
     rows = []
@@ -128,7 +129,7 @@ def _show(result: CalibrationResult) -> None:
     show_table(f"Error {result.horizon} ahead", {"": "", **errors}, rows)
     columns = {"parameter": "", "value": ".4g", "standard error": ".2g", "unit": "", "lower": ".4g", "upper": ".4g"}
     estimates = [
-        (p.name, p.value, p.standard_error, p.unit, p.lower, p.upper,
+        (p.name, p.value, p.standard_error, unit(p.unit), p.lower, p.upper,
          "on a bound" if p.at_bound else "yes" if p.identifiable else "no")
         for p in result.parameters
         if p.standard_error is not None
@@ -176,6 +177,7 @@ def _many(
 ) -> int:  # fmt: skip
     """Calibrate or diagnose each case into a folder of its name; one that fails is reported beside the others."""
     from calibration.fleet.cluster import ClusterExecutor
+    from mpc.reports.display import Displayed, display
 
     do: Callable[..., Sequence[CaseOutcome]]
     files: Files
@@ -193,8 +195,9 @@ def _many(
     try:
         with Waiting(f"{what} cases") as waiting, cluster as executor:
             outcomes = do(
-                cases, out, settings, files=plugins.WithPlugins(files, plugins.loaded), workers=executor or workers,
-                force=force, progress=lambda _, done, total: waiting(f"{done} of {total}", done, total),
+                cases, out, settings, files=plugins.WithPlugins(Displayed(files, display()), plugins.loaded),
+                workers=executor or workers, force=force,
+                progress=lambda _, done, total: waiting(f"{done} of {total}", done, total),
             )  # fmt: skip
     except KeyboardInterrupt:
         complain(f"interrupted: what is finished is in {out}, and the same command goes on from there")
@@ -349,4 +352,4 @@ def _show_diagnosis(result: Diagnosis) -> None:
         say(f"These data cannot test: {', '.join(untestable)}; the report says why.")
     steps = [(f"+ {step.effects[-1]}", step.after, step.share_closed) for step in result.steps]
     errors = [("calibrated model", result.gap, ""), *steps, ("floor", result.floor, "")]
-    show_table(f"Held-out error {result.horizon} ahead", {"": "", "MAE [K]": ".3f", "share closed": ".0%"}, errors)
+    show_table(f"Held-out error {result.horizon} ahead", {"": "", "MAE [K]": ".3f", "share closed": "percent"}, errors)

@@ -27,6 +27,9 @@ WIDE = 130
 #: A bar appears after this time [s].
 PATIENCE = 2.0
 
+#: Time over which the speed is taken that the time left is estimated from [s]: all of it, for parts differ.
+_PERIOD = 3600.0
+
 #: A table on the terminal ends after this many rows.
 MOST_ROWS = 40
 
@@ -64,7 +67,9 @@ def say(text: str) -> None:
     text : str
         Wrapped at the width of the terminal.
     """
-    _console().print(text, soft_wrap=not sys.stdout.isatty())
+    from mpc.reports.display import display
+
+    _console().print(display().text(text), soft_wrap=not sys.stdout.isatty())
 
 
 def complain(text: str) -> None:
@@ -88,7 +93,7 @@ def show_table(
     title : str
         Above the table.
     columns : mapping of str to str
-        How the numbers below each header are spelled, such as ``.3f``; columns of text have none.
+        How the numbers below each header are spelled, such as ``.3f`` or ``percent``; columns of text have none.
     rows : iterable of sequence
         Cells; None is a dash, and text stands as it is in columns of numbers too.
     more : str
@@ -98,21 +103,26 @@ def show_table(
     from rich.table import Table
     from rich.text import Text
 
-    listed = list(rows)
+    from mpc.reports.display import display
+
+    listed, shown = list(rows), display()
     table = Table(box=SIMPLE_HEAD, pad_edge=False)
     for name, spelled in columns.items():
-        table.add_column(name, justify="right" if spelled else "left", overflow="fold")
+        table.add_column(shown.text(name), justify="right" if spelled else "left", overflow="fold")
     for row in listed[:MOST_ROWS]:
-        table.add_row(*(_cell(value, spelled) for value, spelled in zip(row, columns.values(), strict=True)))
+        cells = [_cell(value, spelled) for value, spelled in zip(row, columns.values(), strict=True)]
+        table.add_row(*shown.row(list(columns), cells))
     out = _console()
-    out.print(Text(f"\n{title}", style="bold"))
+    out.print(Text(f"\n{shown.text(title)}", style="bold"))
     out.print(table)
     if len(listed) > MOST_ROWS:
         out.print(f"and {len(listed) - MOST_ROWS} more; {more}")
 
 
 def _cell(value: Any, spelled: str) -> str:
-    return "–" if value is None else value if isinstance(value, str) else format(value, spelled)
+    from mpc.reports.page import spell
+
+    return value if isinstance(value, str) else spell(value, spelled)
 
 
 def answer(json: bool, content: Mapping[str, Any], show: Callable[[], None], report: Path | None = None) -> int:
@@ -156,17 +166,28 @@ class Waiting:
 
     def __init__(self, label: str) -> None:
         self.label = label
+        self.share = 0.0  # of the whole: it never falls
         self._bar: Bar | None = None
         self._timer: Timer | None = None
 
     def __enter__(self) -> Waiting:
         if sys.stderr.isatty():
             from rich.console import Console
-            from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+            from rich.progress import (
+                BarColumn,
+                Progress,
+                SpinnerColumn,
+                TextColumn,
+                TimeElapsedColumn,
+                TimeRemainingColumn,
+            )
 
             words = TextColumn("{task.description}", markup=False)
-            columns = (SpinnerColumn(), words, BarColumn(), TimeElapsedColumn())
-            self._bar = Progress(*columns, console=Console(stderr=True), transient=True)
+            columns = (SpinnerColumn(), words, BarColumn(), TimeElapsedColumn(), TextColumn("left about"))
+            self._bar = Progress(
+                *columns, TimeRemainingColumn(), console=Console(stderr=True), transient=True,
+                speed_estimate_period=_PERIOD,
+            )  # fmt: skip
             self._bar.add_task(self.label, total=None)
             self._timer = Timer(PATIENCE, self._bar.start)
             self._timer.daemon = True
@@ -177,7 +198,9 @@ class Waiting:
         """Say what goes on, and how much of it is done."""
         if self._bar is not None:
             name = f"{self.label}: {stage}" if stage not in self.label else self.label
-            self._bar.update(self._bar.task_ids[0], description=name, completed=done, total=total)
+            known = 1.0 if total > 0 else None  # shares of the whole, as commands may count one thing after another
+            self.share = max(self.share, done / total if total > 0 else 0.0)
+            self._bar.update(self._bar.task_ids[0], description=name, completed=self.share, total=known)
 
     def say(self, text: str) -> None:
         """Write a sentence or two to stdout, above the bar.

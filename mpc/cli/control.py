@@ -26,7 +26,7 @@ class StudyOptions:
 
     case: CaseFolder
     start: Start
-    end: Annotated[str, value("End; the telemetry must hold the weather until then.", "T")]
+    end: Annotated[str, value("End; the telemetry must hold the weather until then, if no --weather is given.", "T")]
     parameters: Parameters = None
     controller_parameters: Annotated[
         Path | None,
@@ -37,8 +37,22 @@ class StudyOptions:
     comfort_price: Annotated[
         float, value("Of a zone's kelvin outside of its band for an hour, for optimal control.", "PRICE")
     ] = 1.0
+    weather: Annotated[
+        Path | None, file("EPW: a typical year in place of the weather that was measured with the case.")
+    ] = None
     tariff: Annotated[
-        Path | None, file("Of electricity, from the Utility Rate Database; default: the paper's, as for gas.")
+        str | None,
+        value("Of electricity: a price per kWh, or a file of the Utility Rate Database; default: the paper's.", "P"),
+    ] = None
+    gas_price: Annotated[
+        str | None, value("Of a kWh of gas, or of another unit: 1.2/therm; default: the paper's.", "P")
+    ] = None
+    currency: Annotated[
+        str | None, value("Of all prices that are given; nothing is converted. Default: USD.", "NAME")
+    ] = None
+    comfort: Annotated[
+        str | None,
+        value("Band of occupied hours, and of others: 21,24 or 21,24,15,30 [degC], or 70F,75F.", "LOW,HIGH"),
     ] = None
     exact: Annotated[bool, switch("--exact", "Sensors without noise and weather forecasts without errors.")] = False
     seed: Annotated[int, value("Seed of noise, forecast errors and random shuffle.")] = 0
@@ -49,21 +63,21 @@ class StudyOptions:
         """Put together what controllers run on."""
         from mpc.loop.noise import SensorNoise
         from mpc.scenario.forecast import DAY_AHEAD_ERRORS
-        from mpc.scenario.tariff import paper_tariff
-        from mpc.scenario.urdb import read_urdb
-        from mpc.scenario.weather_files import weather_of_case
+        from mpc.scenario.from_text import read_comfort, read_tariff
+        from mpc.scenario.weather_files import read_epw, weather_of_case
         from mpc.studies.study import StudySettings, make_study
         from thermal.case.load import load_case
 
-        prices = paper_tariff()
         settings = StudySettings(
             parameters=self.parameters, controller_parameters=self.controller_parameters, dx=self.dx,
-            kind=self.plant, tariff=prices if self.tariff is None else read_urdb(self.tariff, prices.gas),  # type: ignore[arg-type]
+            kind=self.plant, tariff=read_tariff(self.tariff, self.gas_price, self.currency),  # type: ignore[arg-type]
+            comfort=None if self.comfort is None else read_comfort(self.comfort),
             noise=None if self.exact else SensorNoise(), errors={} if self.exact else DAY_AHEAD_ERRORS,
             comfort_price=self.comfort_price, seed=self.seed,
         )  # fmt: skip
         case = load_case(self.case)
-        return make_study(case.building, weather_of_case(case), self.start, self.end, settings)
+        weather = weather_of_case(case) if self.weather is None else read_epw(self.weather)
+        return make_study(case.building, weather, self.start, self.end, settings)
 
 
 @spread
@@ -113,7 +127,13 @@ def compare(
     --end 2023-10-18 --out compared
     """
     from calibration.results import check_results_folder
-    from mpc.reports.control import comparison_rows, comparison_summary, comparison_verdict, write_comparison
+    from mpc.reports.control import (
+        comparison_columns,
+        comparison_rows,
+        comparison_summary,
+        comparison_verdict,
+        write_comparison,
+    )
     from mpc.studies.registry import find_controller
     from mpc.studies.run import compare_controllers
 
@@ -128,9 +148,8 @@ def compare(
 
     def show() -> None:
         say(comparison_verdict(found))
-        numbers = ("cost", "with discomfort", "saved", "discomfort [K h]", "worst zone [K h]", "energy [kWh/m2]",
-                   "peak [W/m2]", "emissions [g/m2]", "way to bound")  # fmt: skip
-        show_table("Controllers", {"controller": "", **dict.fromkeys(numbers, "g")}, comparison_rows(found))
+        name, *numbers = comparison_columns(study.scenario.currency)
+        show_table("Controllers", {name: "", **dict.fromkeys(numbers, "g")}, comparison_rows(found))
         _show_assumed(study)
 
     answer(given.json, comparison_summary(found), show, report)
@@ -143,6 +162,9 @@ def _command() -> str:
 
 
 def _show_assumed(study: Study) -> None:
+    from mpc.reports.assumptions import assumption_rows
+
+    show_table("What these costs rest on", {"assumption": "", "value": ""}, assumption_rows(study))
     for note in study.notes:
         say(f"Assumed: {note}.")
 
@@ -189,9 +211,12 @@ def _show_demo(found: Demo, out: Path) -> None:
     names = {"uncalibrated": "as it was drawn", "calibrated": "calibrated", "with_effects": "with what was found"}
     errors = [(names[key], mae) for key, mae in content["held_out_mae"].items()]
     show_table("Held-out error 6h ahead", {"model": "", "MAE [K]": ".3f"}, errors)
-    columns = {"controller": "", "cost": ".2f", "discomfort [K h]": ".3f", "energy [kWh/m2]": ".3f"}
+    currency = found.comparison.study.scenario.currency
+    columns = {"controller": "", f"energy cost [{currency}]": ".2f", "discomfort, mean zone [K h]": ".3f",
+               "energy [kWh/m²]": ".3f"}  # fmt: skip
     rows = [(row[0], row[1], row[4], row[6]) for row in comparison_rows(found.comparison)]
     show_table(f"Controllers, {content['control']['start'][:10]}", columns, rows)
+    say("Of one day on a simulated building; prices, people and comfort are in the report.")
     say(f"Report: {out / 'report.html'}")
     add = missing_extras("pages", "plan")
     say(f"Next: {f'{add}, then ' if add else ''}buildingmpc label, for a case of your own")

@@ -172,6 +172,8 @@ def _show_check(found: CaseCheck) -> None:
 
 def _show_points(found: CaseCheck) -> None:
     """Write one row a point type; `--json` and the page have one a column."""
+    from mpc.reports.page import unit
+
     by_type: dict[str, list[PointSummary]] = {}
     for point in found.points:
         by_type.setdefault(point.point, []).append(point)
@@ -182,7 +184,7 @@ def _show_points(found: CaseCheck) -> None:
         highest = max((p.highest for p in points if p.highest is not None), default=None)
         mean = sum(means) / len(means) if means else None
         usable = 100 * sum(p.usable_share for p in points) / len(points)
-        rows.append((name, points[0].meaning, points[0].unit, len(points), lowest, mean, highest, usable))
+        rows.append((name, points[0].meaning, unit(points[0].unit), len(points), lowest, mean, highest, usable))
     numbers = {"sensors": "d", "lowest": ".4g", "mean": ".4g", "highest": ".4g", "usable [%]": ".1f"}
     columns = {"point": "", "meaning": "", "unit": "", **numbers}
     if is_narrow():

@@ -59,7 +59,7 @@ def experiment(
     from calibration.experiment.days import begin_of
     from calibration.experiment.design import design_experiment
     from calibration.experiment.members import question_of
-    from calibration.results import write_results
+    from mpc.reports.display import write_results
     from mpc.reports.experiment import experiment_files, experiment_verdict
 
     loaded = options.open_case(case, out, force)

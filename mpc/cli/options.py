@@ -130,6 +130,45 @@ def parse_intervals(texts: Sequence[str] | None, case: Case) -> list[Interval]:
     return [parse_interval(text, case) for text in texts or ()]
 
 
+class DisplayOptions:
+    """Options of every command that writes a report: how results are shown."""
+
+    units: Annotated[str, value("Of pages, figures and tables: si, or ip (°F, ft²). Files of numbers stay SI.", "U")]
+    figures: Annotated[str, value("Write figures as files too: svg or png; default: in the page only.", "KIND")]
+    table_format: Annotated[
+        str,
+        typer.Option("--format", metavar="KIND", help="Write tables as csv or xlsx too, beside parquet."),
+    ]
+
+
+def displaying(command: Callable[..., int]) -> Callable[..., int]:
+    """Give a command the options of how results are shown, which hold while it runs.
+
+    Parameters
+    ----------
+    command : callable
+        That writes a report.
+    """
+    from inspect import get_annotations
+
+    from mpc.reports.display import FIGURES, FORMATS, UNITS, Display, showing
+
+    own = signature(command, eval_str=True)
+    defaults = {"units": UNITS[0], "figures": FIGURES[0], "table_format": FORMATS[0]}
+    kinds = get_annotations(DisplayOptions, eval_str=True)
+    added = [Parameter(n, Parameter.KEYWORD_ONLY, default=d, annotation=kinds[n]) for n, d in defaults.items()]
+
+    @wraps(command)
+    def run(**given: Any) -> int:
+        with showing(Display(**{name: given.pop(name) for name in defaults})):
+            return command(**given)
+
+    parameters = [p.replace(kind=Parameter.KEYWORD_ONLY) for p in own.parameters.values()]
+    run.__signature__ = own.replace(parameters=[*parameters, *added])  # type: ignore[attr-defined]
+    run.__annotations__ = {}
+    return run
+
+
 def ids(text: str) -> list[str]:
     """Read ids between commas.
 

@@ -146,7 +146,7 @@ class SimulationSettings:
         """
         if self.kind == "reduced":
             return ReducedBuilding(reduced_model(grid, [theta], order=order), theta, step_seconds)
-        usual, advice = built.structure == BASELINE, "take kind='reduced'"
+        usual, advice = built.structure == BASELINE, "take --plant reduced (kind='reduced')"
         PlantError.unless(usual, "plant on the grid", "the usual structure of the model", "another", advice)
         values = {p.name: float(v) for p, v in zip(grid.network.parameters, theta, strict=True)}
         shuffle = Shuffle("random" if self.kind == "random" else "mean", reach=built.reach, seed=self.seed)

@@ -9,13 +9,15 @@ import pandas as pd
 
 from calibration.evaluation.case_model import CHECK_TOLERANCE
 from calibration.fit.result import CalibrationResult, ParameterEstimate
-from calibration.results import Content, check_results_folder, write_results
+from calibration.results import Content, check_results_folder
 from mpc.reports import evaluation
+from mpc.reports.display import write_results
 from mpc.reports.figures.calibration import MOST_ROWS, paper_values, parameter_ranges
 from mpc.reports.figures.errors import error_band, error_growth, median_run
 from mpc.reports.figures.field import spatial_field
 from mpc.reports.identifiability import information_content, information_sentences
-from mpc.reports.page import counted, duration, estimated_sentences, in_words, kelvin, render
+from mpc.reports.means import calibration_means, determined_words
+from mpc.reports.page import counted, duration, estimated_sentences, in_words, kelvin, percent, render
 from mpc.reports.residuals import diagnostics_content
 from thermal.case.case import Case
 from thermal.model.case_replay import Inputs, replay_inputs
@@ -146,7 +148,8 @@ def _emitter_sentences(result: CalibrationResult) -> list[str]:
         return []
     values = {p.name: p.value for p in result.parameters}
     floors = [name.partition("@")[2] for name, v in values.items() if name.startswith("floor_heat_share@") and v > 0.5]
-    radiant = f"{values['radiator_radiant_share']:.0%} of it radiates" if "radiator_radiant_share" in values else ""
+    share = values.get("radiator_radiant_share")
+    radiant = "" if share is None else f"{percent(share)} of it radiates"
     if not floors:
         return [f"Metered heat behaves as if radiators gave it: {radiant}."] if radiant else []
     rest = len(floors) < sum(name.startswith("floor_heat_share@") for name in values)
@@ -167,9 +170,11 @@ def _parameter_sentence(parameters: Sequence[ParameterEstimate]) -> str:
     whole = [p for p in estimated if p.at_bound and p.base == "floor_heat_share"]
     bound = [in_words(p.name) for p in estimated if p.at_bound and p not in (*absent, *whole)]
     free = len(estimated) - told - len(bound) - len(absent) - len(whole)
-    parts = [f"Of {counted(len(estimated), 'estimated parameter')} the data determine {told or 'none'}"]
+    begin = f"Of {counted(len(estimated), 'estimated parameter')} the data determine {told or 'none'} by "
+    parts = [begin + ("itself" if told == 1 else "themselves")]
     if free:
-        parts.append(f"{free} stay{'s' if free == 1 else ''} open within the physical range")
+        open_ = f"{free} stay{'s' if free == 1 else ''} open within the physical range"
+        parts.append(f"{open_}, as other values predict equally well: do not quote them")
     if absent:
         parts.append(f"{counted(len(absent), 'solar aperture')} of no size: no sun is seen to enter there")
     if whole:
@@ -212,6 +217,8 @@ def _content(result: CalibrationResult, case: Case, grid: SymbolicModel, inputs:
         "after": after,
         "subtitle": evaluation.subtitle(case, after),
         "verdict": calibration_verdict(result),
+        "means": calibration_means(result, evaluation.unchanged_error(after)),
+        "determined": determined_words([p for p in result.parameters if p.standard_error is not None]),
         "fine": result.solver.success and after.metrics.mae < before.metrics.mae,
         "parts": [(title, result.uncalibrated[k].metrics, result.calibrated[k].metrics,
                    evaluation.unchanged_error(result.calibrated[k])) for title, k in parts.items()],

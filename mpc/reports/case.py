@@ -11,7 +11,8 @@ from mpc.reports.evaluation import by_error, error_maps, tidy
 from mpc.reports.figures.errors import Series, zone_panels
 from mpc.reports.figures.plan import plan_drawings, quality_timeline
 from mpc.reports.figures.style import CELSIUS
-from mpc.reports.page import counted, duration, kelvin, significant, write_report
+from mpc.reports.means import check_means, simulation_means
+from mpc.reports.page import counted, duration, kelvin, percent, significant, write_report
 from thermal.case.building import FloorPlans
 from thermal.case.case import Case
 from thermal.case.check import CaseCheck
@@ -45,6 +46,7 @@ def write_check(check: CaseCheck, out: str | Path, *, force: bool = False) -> Pa
     content = {
         "check": check,
         "verdict": check_verdict(check),
+        "means": check_means(check),
         "span": f"{(check.end - check.start).total_seconds() / 86400:.3g} days",
         "plans": plan_drawings(plans, building.orientation) if plans else [],
         "missing_rows": sum(finding.steps for finding in quality.missing_rows),
@@ -76,7 +78,7 @@ def check_verdict(check: CaseCheck) -> str:
     parts = [
         f"{valid} {counted(len(check.zones), 'zone')} on {significant(check.floor_area)} m², {measured}",
         f"of them measured, {counted(len(check.devices), 'device')}, {days:.3g} days of telemetry every",
-        f"{duration(check.step)}. {100 * usable:.1f} % of its values can be used",
+        f"{duration(check.step)}. {percent(usable)} of its values can be used",
     ]
     text = " ".join(parts) + (f"; {flawed} of {len(check.quality.columns)} columns lack some." if flawed else ".")
     if check.anomalies:
@@ -205,6 +207,7 @@ def _simulation_content(simulation: Simulation, case: Case, summary: dict[str, A
         "case": case.building.name,
         "summary": summary,
         "verdict": simulation_verdict(summary),
+        "means": simulation_means(summary),
         "span": (simulation.start, series.stamps[-1]),
         "figures": {
             "plan": isinstance(case.building.geometry, FloorPlans),

@@ -11,9 +11,11 @@ import numpy as np
 import pandas as pd
 
 from mpc.kpi.kpis import Kpis
+from mpc.reports.assumptions import assumption_rows
 from mpc.reports.figures.control import cost_bars, course, expectations, side_by_side
 from mpc.reports.figures.style import CELSIUS
-from mpc.reports.page import duration, significant, spell, write_report
+from mpc.reports.means import NOTICED, comparison_means, control_means
+from mpc.reports.page import duration, percent, significant, spell, write_report
 from mpc.studies.run import Comparison, ControlRun, prediction_errors
 from thermal.case.points import POINT_TYPES, split_column
 from thermal.units import QUANTITIES, from_si
@@ -52,6 +54,7 @@ def write_control(run: ControlRun, out: str | Path, *, command: str = "", force:
     content = _content((run,), run, command) | {
         "title": title,
         "verdict": control_verdict(run),
+        "means": control_means(run),
         "table": None,
     }
     files = {"control.json": control_summary(run), "trajectory.parquet": trajectory(run)}
@@ -86,7 +89,10 @@ def write_comparison(comparison: Comparison, out: str | Path, *, command: str = 
     content = _content(runs, comparison.of("mpc") or runs[0], command) | {
         "title": f"Controllers of {comparison.study.name} compared",
         "verdict": comparison_verdict(comparison),
+        "means": comparison_means(comparison),
+        "columns": comparison_columns(runs[0].kpis.currency),
         "table": comparison_rows(comparison),
+        "comfortable": all(z.below + z.above < NOTICED for run in runs for z in run.kpis.zones),
         "pictures": [*cost_bars(runs), *side_by_side(runs)],
     }
     files: dict[str, Any] = {"comparison.json": comparison_summary(comparison)}
@@ -103,6 +109,7 @@ def _content(runs: Sequence[ControlRun], shown: ControlRun, command: str) -> dic
         "planned": shown.sources.get("optimal plan", 0),
         "indicators": own_indicators(shown.kpis),
         "runs": [_section(run, run is shown) for run in runs],
+        "assumptions": assumption_rows(shown.study),
         "command": command,
     }
 
@@ -117,6 +124,7 @@ def _section(run: ControlRun, shown: bool) -> dict[str, Any]:
         "errors": prediction_errors(run),
         "reasons": reason_rows(run),
         "planned": bool(run.decisions),
+        "comfortable": all(z.below + z.above < NOTICED for z in run.kpis.zones),
         "zones": sorted(run.kpis.zones, key=lambda z: -(z.below + z.above)),
     }
 
@@ -197,7 +205,19 @@ def trajectory(run: ControlRun) -> pd.DataFrame:
     columns["electricity_price"], columns["gas_price"] = scenario.electricity_price[:n], scenario.gas_price[:n]
     columns["true/electricity"] = record.electricity
     columns["true/gas"] = np.zeros(n) if record.gas is None else record.gas
-    return pd.DataFrame(columns, index=frame.index)
+    table = pd.DataFrame(columns, index=frame.index)
+    table.attrs["units"] = {name: _unit_of(name, scenario.currency) for name in columns}
+    return table
+
+
+def _unit_of(name: str, currency: str) -> str:
+    """Give the unit of a column of the course."""
+    if name.endswith("_price"):
+        return f"{currency}/kWh"
+    if name in ("true/electricity", "true/gas"):
+        return "W"
+    point = name.rpartition("/")[2]
+    return QUANTITIES[POINT_TYPES[point].quantity].file_unit if point in POINT_TYPES else "degC"
 
 
 def own_indicators(kpis: Kpis) -> list[tuple[str, str]]:
@@ -226,7 +246,7 @@ def control_verdict(run: ControlRun) -> str:
     parts = [
         f"{run.entry.title.capitalize()} spent {money(run.cost, k.currency)} on energy in "
         f"{duration(3600.0 * k.hours)} ({significant(k.ener_tot)} kWh/m², of which "
-        f"{electricity / max(electricity + gas, 1e-9):.0%} electricity)."
+        f"{percent(electricity / max(electricity + gas, 1e-9))} electricity)."
     ]
     if k.tdis_tot < 1e-3:
         parts.append("No zone left its comfort band.")
@@ -276,7 +296,7 @@ def comparison_verdict(comparison: Comparison) -> str:
     comfort = mpc.kpis.tdis_tot - best.kpis.tdis_tot
     parts = [
         f"Optimal control spent {money(mpc.cost, mpc.kpis.currency)} on energy, the best rule ({name}) "
-        f"{money(best.cost, best.kpis.currency)}: {abs(change):.0%} {'less' if change >= 0 else 'more'}."
+        f"{money(best.cost, best.kpis.currency)}: {percent(abs(change))} {'less' if change >= 0 else 'more'}."
     ]
     if abs(comfort) < 0.01:
         parts.append("Both keep the zones equally comfortable.")
@@ -289,9 +309,25 @@ def comparison_verdict(comparison: Comparison) -> str:
     if way is not None:
         parts.append(
             f"Counting discomfort at {comparison.study.settings.comfort_price:g} {mpc.kpis.currency} a kelvin hour and "
-            f"zone, that is {way:.0%} of the perfect-forecast savings."
+            f"zone, that is {percent(way)} of the perfect-forecast savings."
         )
     return " ".join(parts)
+
+
+def comparison_columns(currency: str) -> list[str]:
+    """Heads of the table of controllers.
+
+    Parameters
+    ----------
+    currency : str
+        Of costs.
+    """
+    return [
+        "controller", f"energy cost [{currency}]", f"energy cost and price of discomfort [{currency}]",
+        "saved against the best rule, discomfort counted", "discomfort, mean zone [K h]",
+        "discomfort, worst zone [K h]", "energy [kWh/m²]", "highest quarter of an hour of electricity [W/m²]",
+        "emissions of CO₂ [g/m²]", "share of the perfect-forecast savings",
+    ]  # fmt: skip
 
 
 def comparison_rows(comparison: Comparison) -> list[list[str]]:
@@ -308,9 +344,9 @@ def comparison_rows(comparison: Comparison) -> list[list[str]]:
         worst = max(z.below + z.above for z in k.zones)
         way = comparison.way_to_bound(run) if run.controller in ("mpc", "bound") else None
         values = (
-            (run.cost, ",.2f"), (run.objective, ",.2f"), (None if best else comparison.saving(run), ".1%"),
+            (run.cost, ",.2f"), (run.objective, ",.2f"), (None if best else comparison.saving(run), "percent"),
             (k.tdis_tot, ".3f"), (worst, ".2f"), (k.ener_tot, ".3f"), (1e3 * (k.pele_tot or 0.0), ".1f"),
-            (None if k.emis_tot is None else 1e3 * k.emis_tot, ".1f"), (way, ".0%"),
+            (None if k.emis_tot is None else 1e3 * k.emis_tot, ".1f"), (way, "percent"),
         )  # fmt: skip
         rows.append([run.entry.title, *(spell(value, how) for value, how in values)])
     return rows

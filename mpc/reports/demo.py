@@ -3,11 +3,13 @@
 from collections.abc import Mapping, Sequence
 
 from calibration.evaluation.n_step import Evaluation
+from mpc.reports.assumptions import assumption_rows
 from mpc.reports.diagnosis_words import called
 from mpc.reports.figures import style
 from mpc.reports.figures.control import cost_bars
 from mpc.reports.figures.style import Picture, panel, picture, styled
-from mpc.reports.page import render
+from mpc.reports.means_found import demo_means
+from mpc.reports.page import percent, render
 from mpc.studies.run import Comparison
 
 
@@ -47,8 +49,8 @@ def render_demo(
     cards = [(f"{e.metrics.mae:.2f} K", told) for e, told in zip(errors.values(), meanings, strict=True)]
     mpc, best = comparison.of("mpc"), comparison.best_rule
     if mpc is not None and best is not None:
-        saved = f"{1.0 - mpc.cost / best.cost:.0%}".replace("-", "−")
-        cards.append((saved, "less spent on energy than by the best rule"))
+        saved = "less spent on energy than by the best rule, on one simulated day"
+        cards.append((percent(1.0 - mpc.cost / best.cost), saved))
     content = {
         "case": case,
         "fine": fine,
@@ -57,6 +59,8 @@ def render_demo(
         "links": links,
         "pictures": {"evaluate": _error_lines(errors), "compare": cost_bars(comparison.runs)},
         "study": comparison.study,
+        "means": demo_means(errors, effects, comparison),
+        "assumptions": assumption_rows(comparison.study),
     }
     return render("demo", content | {"verdict": f"{verdicts['diagnose']} {verdicts['compare']}"})
 

@@ -11,16 +11,18 @@ from calibration.diagnosis.decide.levels import LARGEST_GROUP
 from calibration.diagnosis.decide.verdict import Candidate, generic_from
 from calibration.diagnosis.diagnosis import Diagnosis, Replay
 from calibration.diagnosis.refit.search import Round, accepted_from
-from calibration.results import Content, check_results_folder, write_results
+from calibration.results import Content, check_results_folder
 from mpc.reports import diagnosis_words
 from mpc.reports.correction_words import correction_sentence, driver_rows
 from mpc.reports.diagnosis_words import accepted, alike, called, in_zones, rivals
+from mpc.reports.display import write_results
 from mpc.reports.drift_words import drift_sentence
 from mpc.reports.evaluation import command, predictions_table, subtitle
 from mpc.reports.figures.diagnosis import change_panels, drift_lines, hour_bars, missing_lines
 from mpc.reports.figures.errors import series_of_runs
 from mpc.reports.figures.plan import heat_maps
 from mpc.reports.figures.style import CELSIUS, Picture
+from mpc.reports.means_found import diagnosis_means
 from mpc.reports.page import kelvin, listed, render, significant, sure, unit
 from thermal.case.building import FloorPlans
 from thermal.case.case import Case
@@ -158,6 +160,7 @@ def _content(result: Diagnosis, case: Case, replayed: Sequence[Replay]) -> dict[
         "result": result,
         "subtitle": subtitle(case, evaluations[0]),
         "verdict": diagnosis_words.diagnosis_verdict(result),
+        "means": diagnosis_means(result),
         "fine": result.verdict.name != "unexplained",
         "found": found,
         "ahead": diagnosis_words.ahead(result),

@@ -314,7 +314,7 @@ def where_sentence(where: Where) -> str:
     place, moment, share, predictions = where.most
     when = moment if not moment or moment.startswith(("with", "in")) else f"when {moment}"
     spoken = " ".join(filter(None, (f"in {place}" if place else "", when)))
-    return f"{share:.0%} of the squared error is {spoken}, which has {predictions:.0%} of the predictions."
+    return f"{percent(share)} of the squared error is {spoken}, which has {percent(predictions)} of the predictions."
 
 
 def part(name: str) -> str:

@@ -16,6 +16,7 @@ from mpc.reports.figures.errors import Band, drift_boxes, error_growth, median_r
 from mpc.reports.figures.field import Field
 from mpc.reports.figures.plan import floor_maps, tile_map
 from mpc.reports.figures.style import CELSIUS, Picture
+from mpc.reports.means import prediction_means
 from mpc.reports.page import clock, counted, duration, estimated_sentences, kelvin, listed, write_report
 from thermal._types import FloatArray
 from thermal.case.building import FloorPlans
@@ -55,6 +56,7 @@ def write_evaluation(
         "case": case.building.name,
         "subtitle": subtitle(case, evaluation),
         "verdict": evaluation_verdict(evaluation),
+        "means": prediction_means(evaluation, unchanged_error(evaluation)),
         "evaluation": evaluation,
         "unchanged": unchanged_error(evaluation),
         "horizons": horizon_rows(evaluation),

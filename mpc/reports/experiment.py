@@ -11,7 +11,9 @@ from calibration.experiment.outcome import Outcome
 from calibration.experiment.schedule import STATIC_PRESSURE, SUPPLY_AIR, Move
 from calibration.results import Content
 from mpc.reports.diagnosis_words import called
+from mpc.reports.figures import style
 from mpc.reports.figures.style import Picture, keys_below, lines_over_time, panel, picture, styled
+from mpc.reports.means_found import experiment_means
 from mpc.reports.page import clock, duration, listed, percent, render, significant
 from thermal.case.case import Case
 
@@ -69,7 +71,9 @@ def expected_table(found: Experiment) -> pd.DataFrame:
             columns[member] = found.best.emulated[member].zone[:, i] - _FREEZING
             columns[f"{member}_usual"] = found.usual.emulated[member].zone[:, i] - _FREEZING
         parts.append(pd.DataFrame({"zone": zone, **columns}, index=stamps))
-    return pd.concat(parts).sort_index(kind="stable")
+    table = pd.concat(parts).sort_index(kind="stable")
+    table.attrs["units"] = {name: "degC" for name in table if name != "zone"}
+    return table
 
 
 def _stamps(found: Experiment) -> pd.DatetimeIndex:
@@ -151,6 +155,7 @@ def _content(found: Experiment, case: Case, outcome: Outcome | None) -> dict[str
                                        outcome.probability[e]) for e in outcome.ranked]  # fmt: skip
     return {
         "case": case.building.name, "verdict": experiment_verdict(found, outcome),
+        "means": experiment_means(found, outcome), "prices": found.settings.prices,
         "subtitle": f"{clock(found.start)} to {clock(found.schedule.end)}", "found": found,
         "chance": found.chance, "usual": found.usual_chance, "pairs": pairs,
         "steps": steps_of(found), "worst": worst, "cost": significant(found.best.cost, 2),
@@ -169,12 +174,12 @@ def _pictures(found: Experiment) -> list[Picture]:
     order = np.argsort(-np.ptp(zones, axis=0).mean(axis=0), kind="stable")[:_PANELS]
     drawn = []
     for i in order.tolist():
-        figure, axes = panel(5.2, 2.9, title=found.zones[i], ylabel="°C")
+        figure, axes = panel(5.2, 2.9, title=found.zones[i], ylabel="zone temperature [°C]")
         x = lines_over_time(axes, stamps)
         for k, (effect, made) in enumerate(found.best.emulated.items()):
             axes.plot(x, made.zone[:, i] - _FREEZING, label=called(effect), linestyle=("-", "--", ":", "-.")[k % 4])
         usual = next(iter(found.usual.emulated.values())).zone[:, i] - _FREEZING
-        axes.plot(x, usual, color="0.6", linewidth=0.9, label="usual operation")
+        axes.plot(x, usual, color=style.MUTED, linewidth=0.9, label="usual operation")
         keys_below(figure, 2)
-        drawn.append(picture(figure, f"Expected temperature of {found.zones[i]} by what causes the gap"))
+        drawn.append(picture(figure, f"Expected temperature of {found.zones[i]} by what causes the gap", zoom=True))
     return drawn

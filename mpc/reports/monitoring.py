@@ -8,6 +8,7 @@ from calibration.monitoring.days import USUAL
 from calibration.monitoring.monitor import Monitoring
 from mpc.reports.diagnosis_words import called, in_zones
 from mpc.reports.figures.monitoring import time_line
+from mpc.reports.means_found import monitoring_means
 from mpc.reports.page import counted, listed, significant, sure, unit, write_report
 from thermal.effects.catalogue import CATALOGUE
 
@@ -33,7 +34,8 @@ def write_monitoring(found: Monitoring, out: str | Path, *, force: bool = False)
         The page.
     """
     content = {
-        "case": found.case, "verdict": monitoring_verdict(found), "events": event_rows(found),
+        "case": found.case, "verdict": monitoring_verdict(found), "means": monitoring_means(found),
+        "events": event_rows(found),
         "figures": time_line(found), "span": (found.days.dates[0], found.days.dates[-1]),
         "reference": found.settings.reference_days, "threshold": found.course.threshold,
         "withdrawn": [f"{found.date(day):%Y-%m-%d}" for day in found.course.withdrawn],

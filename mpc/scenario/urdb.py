@@ -114,7 +114,8 @@ class _Item(NamedTuple):
         ScenarioError.unless((tier or 0) >= 0, "tier", "0 or more", repr(tier))
         for number, tiers in enumerate(structure):
             at, found = f"{self.where}: {key}[{number}]", f"{len(tiers)}, the first up to {tiers[0].get('max')} {unit}"
-            ScenarioError.unless(len(tiers) == 1 or tier is not None, at, "one tier", found, "choose one by `tier`")
+            advice = "choose one, the first by --tariff FILE:0 (tier=0)"
+            ScenarioError.unless(len(tiers) == 1 or tier is not None, at, "one tier", found, advice)
             chosen = tiers[min(tier or 0, len(tiers) - 1)]
             named = chosen.get("unit") or self.parts.get(given) or unit
             ScenarioError.unless(named == unit, f"{at}: unit", repr(unit), repr(named))

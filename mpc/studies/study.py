@@ -82,6 +82,8 @@ class Study:
         What was chosen.
     notes : tuple of str
         What was assumed, in words.
+    weather : str
+        Where the weather is from, in words.
     """
 
     name: str
@@ -93,6 +95,7 @@ class Study:
     built: ModelSettings
     settings: StudySettings
     notes: tuple[str, ...] = ()
+    weather: str = "as measured with the case"
 
     @property
     def building(self) -> Building:
@@ -177,7 +180,7 @@ def make_study(
     longer = StepGrid(grid.start, MODEL_STEP, grid.n_steps + round(HORIZON_HOURS * 3600.0 / MODEL_STEP))
     built = model_settings(given.parameters, dx=given.dx)
     if given.system is None:
-        notes += ("sizes of the plant follow from the building's loads (thermal.system.sizing.size_system)",)
+        notes += ("sizes of the plant follow from the loads of the building",)
     gains = None
     if "internal_gains" in built.effects:
         gains = InternalGains(sensible=0.0, equipment=0.0, lights=0.0)
@@ -188,7 +191,16 @@ def make_study(
         believed = model_settings(given.controller_parameters, dx=given.dx)
         model = reduced(believed, ready, given.controller_parameters, given.order)
     system = given.system or size_system(ready)
-    return Study(building.name, scenario, grid.n_steps, system, truth, model, built, given, notes)
+    source = _weather_words(weather)
+    return Study(building.name, scenario, grid.n_steps, system, truth, model, built, given, notes, source)
+
+
+def _weather_words(weather: Weather) -> str:
+    """Say where weather is from."""
+    if not weather.typical:
+        return "as measured with the case"
+    place = weather.location
+    return f"a typical year from a file, no particular day, at {place.latitude:.2f}°, {place.longitude:.2f}°"
 
 
 def _prolonged(weather: Weather, run: StepGrid, whole: StepGrid) -> Weather:

@@ -34,7 +34,25 @@ def test_compare_prints_a_table_and_what_was_assumed(tmp_path: Path) -> None:
     assert answer.exit_code == 0, answer.stderr
     text = " ".join(answer.stdout.split())
     assert "Optimal control spent" in text and "fixed schedule" in text and "no air handler and no boiler" in text
+    assert "[USD]" in text and "21 to 24 °C when occupied" in text and "Simulated, not the real" in text
     assert (tmp_path / "two" / "trajectory_schedule.parquet").exists()
+
+
+def test_prices_comfort_and_display_are_options(tmp_path: Path) -> None:
+    out = tmp_path / "own"
+    answer = run(
+        "compare", CASE, *SPAN, "--controllers", "reset", "--tariff", "0.3", "--gas-price", "1/therm", "--currency", "EUR",
+        "--comfort", "66F,78F", "--units", "ip", "--format", "csv", "--out", out,
+    )  # fmt: skip
+    assert answer.exit_code == 0, answer.stderr
+    text = " ".join(answer.stdout.split())
+    assert "[EUR]" in text and "[°F h]" in text and "66.00 to 78.00 °F" in text
+    assert "0.3 EUR per kWh" in text and "0.03412 EUR per kWh" in text
+    page = (out / "report.html").read_text(encoding="utf-8")
+    for told in ("What these costs rest on", "energy cost [EUR]", "discomfort, mean zone [°F h]", "nothing is converted", "66.00 to 78.00 °F", "0.3 EUR per kWh"):
+        assert told in page
+    assert "/zone_air_temperature_sensor [degC]" in (out / "trajectory_reset.csv").read_text(encoding="utf-8")
+    assert ("outside of the band" in page) == ("left the comfort band" in page)
 
 
 def test_bad_input_leaves_nothing_behind(tmp_path: Path) -> None:
@@ -42,6 +60,10 @@ def test_bad_input_leaves_nothing_behind(tmp_path: Path) -> None:
         (("--controller", "mcp"), "'mpc'"),
         (("--plant", "grids"), "reduced, grid, random"),
         (("--end", "2024-01-01"), "weather"),
+        (("--weather", "none.epw"), "none.epw"),
+        (("--currency", "EUR"), "nothing is converted"),
+        (("--comfort", "24,21"), "each LOW is below"),
+        (("--units", "imperial"), "si, ip"),
     ):
         answer = run("control", CASE, *SPAN, "--out", tmp_path / "none", *more)
         assert answer.exit_code == 2 and word in answer.stderr and not (tmp_path / "none").exists()

@@ -73,6 +73,27 @@ def test_a_bar_appears_on_a_terminal_only_and_only_after_a_while(monkeypatch: py
     assert "long: work" in shown and "short" not in shown
 
 
+@pytest.mark.skipif(not hasattr(os, "openpty"), reason="needs a pseudo-terminal")
+def test_the_bar_never_goes_back_and_says_how_long_it_takes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_console, "PATIENCE", 0.05)
+    monkeypatch.setenv("TERM", "xterm")
+    main_end, terminal = os.openpty()
+    with os.fdopen(terminal, "w", encoding="utf-8") as stream:
+        monkeypatch.setattr(sys, "stderr", stream)
+        with _console.Waiting("long") as waiting:
+            shares = []
+            for done, total in ((1, 4), (0, 0), (1, 2), (1, 8), (3, 4), (0, 4)):
+                waiting("work", done, total)
+                time.sleep(0.12)
+                assert waiting._bar is not None
+                shares.append(waiting._bar.tasks[0].completed)
+        stream.flush()
+        shown = os.read(main_end, 100_000).decode("utf-8")
+    os.close(main_end)
+    assert shares == [0.25, 0.25, 0.5, 0.5, 0.75, 0.75]
+    assert "left about" in shown and "0:00:0" in shown
+
+
 def test_no_bar_without_a_terminal(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setattr(_console, "PATIENCE", 0.01)
     with _console.Waiting("long") as waiting:

@@ -14,9 +14,9 @@ from calibration.diagnosis.refit.comparison import Effects, Fit, ModelComparison
 from calibration.diagnosis.refit.refit import ACCEPTED, held_out
 from calibration.diagnosis.refit.search import Round, search
 from calibration.errors import CalibrationError
-from calibration.evaluation.n_step import Progress
 from calibration.fit.fitted_case import is_large
 from calibration.fit.ladder import MASSES
+from calibration.progress import Progress
 from thermal.errors import ModelError
 from thermal.parameters import Scope
 

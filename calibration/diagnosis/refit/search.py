@@ -17,11 +17,14 @@ from calibration.diagnosis.refit.refit import ACCEPTED, WINDOWS, HeldOut, Refit,
 from calibration.diagnosis.screen.gains import Gain
 from calibration.diagnosis.screen.own_nulls import OwnNulls, own_nulls
 from calibration.diagnosis.screen.screen import Screening, screen
-from calibration.evaluation.n_step import Progress
+from calibration.progress import Forward, Progress
 from thermal.effects.catalogue import CATALOGUE
 
 #: Most rounds, and most effects that a round fits anew.
 ROUNDS, MOST_REFITS = 8, 4
+
+#: Share of the progress that is left which a round takes [-]: there are two to four.
+_SHARE = 0.4
 
 #: Gain by tangents from which an effect is fitted anew [-], and the least share of the best's that it must have.
 LEAST_GAIN, LEAST_SHARE = 3.0, 0.4
@@ -137,12 +140,13 @@ def search(
         Called with stage, done, total.
     """
     done: list[Round] = []
+    whole = Forward(progress)
     ahead: Refit | None = None
     own: OwnNulls | None = None
     fit = baseline
     while len(done) < ROUNDS:
-        if progress is not None:
-            progress("diagnose", len(done), ROUNDS)
+        part = whole.part(_SHARE, f"round {len(done) + 1}")
+        part("screening", 0, 1)
         open_ = [e for e in candidates if all(r in fit.effects for r in CATALOGUE[e].requires)]
         made, gains, generic = screen(models, fit, open_)
         if own is not None:
@@ -153,7 +157,9 @@ def search(
             fit, errors, ahead = exchanged.after, exchanged.after_held_out, exchanged.pair
             continue
         work = Work(models, fit, errors, made, ACCEPTED if own is None else accepted_from(own))
+        part("fitting effects", 1, 4)
         refits = _refits(work, gains, ahead)
+        part("looking at zones and pairs", 3, 4)
         refits = look_again(work, gains, refits, _first(errors, refits))
         best = _first(errors, refits)
         if own is None:
@@ -170,8 +176,6 @@ def search(
         if best is None:
             break
         fit, errors, ahead = best.fit, best.held_out, pair
-    if progress is not None:
-        progress("diagnose", ROUNDS, ROUNDS)
     return tuple(done)
 
 

@@ -223,4 +223,4 @@ def heat_lines(stamps: pd.DatetimeIndex, metered: FloatArray, needed: FloatArray
     keys_below(figure, 2)
     means = [float(np.nanmean(line)) for line in lines]
     alt = f"Heat of the building by the hour: metered {means[0]:.2f} kW on average, needed {means[1]:.2f} kW"
-    return [picture(figure, alt)]
+    return [picture(figure, alt, zoom=True)]

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from mpc.reports.figures import style
 from mpc.reports.figures.style import CELSIUS, MEASURED, MUTED, SIMULATED, Picture, picture, styled
+from mpc.reports.means import NOTICED
 from mpc.studies.run import AHEAD, ControlRun, compared_decisions
 from thermal._types import FloatArray
 
@@ -57,7 +58,8 @@ def course(run: ControlRun) -> list[Picture]:
     power.set(title="What it took", ylabel="power [kW]")
     for one in axes:
         _legend(one, 1.06)
-    return [picture(figure, "Prices, weather, zone temperatures, setpoints and power of the run, over time")]
+    alt = f"{run.entry.title.capitalize()}: prices, weather, zone temperatures, setpoints and power over time"
+    return [picture(figure, alt, zoom=True)]
 
 
 def _legend(axes: Axes, beside: float = 1.01) -> None:
@@ -139,7 +141,7 @@ def expectations(run: ControlRun) -> list[Picture]:
         _legend(axes)
     upper.set(title="Mean temperature of the zones", ylabel="[°C]")
     lower.set(title="Electricity and gas, mean of the hour", ylabel="[kW]")
-    return [picture(figure, "Expected and realised zone temperatures and power")]
+    return [picture(figure, "Expected and realised zone temperatures and power", zoom=True)]
 
 
 @styled
@@ -172,7 +174,7 @@ def side_by_side(runs: Sequence[ControlRun]) -> list[Picture]:
     air.set(title="Supply air setpoint", ylabel="[°C]")
     water.set(title="Supply water setpoint", ylabel="[°C]")
     _legend(cost)
-    return [picture(figure, "Cost, zone temperatures and setpoints of the controllers over time")]
+    return [picture(figure, "Cost, zone temperatures and setpoints of the controllers over time", zoom=True)]
 
 
 @styled
@@ -185,7 +187,11 @@ def cost_bars(runs: Sequence[ControlRun]) -> list[Picture]:
         Of one study.
     """
     figure = Figure(figsize=(10.0, 0.9 + 0.42 * len(runs)))
-    left, right = figure.subplots(1, 2, sharey=True, gridspec_kw={"width_ratios": [2.0, 1.0]})
+    discomfort = [run.kpis.tdis_tot for run in runs]
+    some = any(z.below + z.above >= NOTICED for run in runs for z in run.kpis.zones)
+    left, *others = np.atleast_1d(
+        figure.subplots(1, 1 + some, sharey=True, gridspec_kw={"width_ratios": [2.0, 1.0][: 1 + some]})
+    )
     place = np.arange(len(runs))
     electricity, gas = np.array([[part.sum() for part in _costs(run)] for run in runs]).T
     left.barh(place, electricity, color=MEASURED, alpha=0.8, label="electricity")
@@ -194,12 +200,13 @@ def cost_bars(runs: Sequence[ControlRun]) -> list[Picture]:
     left.invert_yaxis()
     left.set_xlabel(f"energy cost [{runs[0].study.scenario.currency}]")
     left.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, fontsize=8)  # above: bars fill the axes
-    discomfort = [run.kpis.tdis_tot for run in runs]
-    bars = right.barh(place, discomfort, color=style.WARNING, alpha=0.7)
-    right.bar_label(bars, fmt="%.2f", padding=3.0, fontsize=8)  # where nobody leaves the band there is no bar
-    right.set_xlim(0.0, 1.25 * max(_FELT, *discomfort))
-    right.set_xlabel("outside of the band, mean zone [K h]")
-    return [picture(figure, "Energy cost and discomfort of the controllers")]
+    for right in others:
+        bars = right.barh(place, discomfort, color=style.WARNING, alpha=0.7)
+        right.bar_label(bars, fmt="%.2f", padding=3.0, fontsize=8)
+        right.set_xlim(0.0, 1.25 * max(_FELT, *discomfort))
+        right.set_xlabel("outside of the band, mean zone [K h]")
+    told = "and discomfort of the controllers" if some else "of the controllers; no zone left its comfort band"
+    return [picture(figure, f"Energy cost {told}")]
 
 
 def _costs(run: ControlRun) -> tuple[FloatArray, FloatArray]:

@@ -9,7 +9,7 @@ from matplotlib.ticker import NullFormatter
 from mpc.reports.figures import style
 from mpc.reports.figures.errors import Series
 from mpc.reports.figures.style import Picture, keys_below, lines_over_time, panel, picture, styled
-from mpc.reports.page import watts
+from mpc.reports.page import percent, watts
 from thermal._types import FloatArray
 
 #: Zones that are drawn before and after.
@@ -47,7 +47,7 @@ def hour_bars(shares: FloatArray) -> list[Picture]:
     axes.grid(axis="x", visible=False)
     axes.legend(fontsize=8, loc="best")
     worst = int(np.argmax(shares))
-    alt = f"Share of the squared error by hour of the day; most, {shares[worst]:.0%}, from {worst} to {worst + 1} h"
+    alt = f"Share of the squared error by hour; most, {percent(shares[worst])}, from {worst} to {worst + 1} h"
     return [picture(figure, alt)]
 
 
@@ -81,7 +81,8 @@ def change_panels(
             x, before.measured[rows, column] - style.CELSIUS, color=style.MEASURED, linewidth=1.1, label="measured"
         )
         keys_below(figure, 3)
-        pictures.append(picture(figure, f"Zone {zone}, measured and predicted; mean absolute error {told} K"))
+        alt = f"Zone {zone}, measured and predicted; mean absolute error {told} K"
+        pictures.append(picture(figure, alt, zoom=True))
     return pictures
 
 
@@ -113,7 +114,7 @@ def missing_lines(
             axes.plot(along, heat, color=colour, linestyle=dashes, linewidth=1.3, label=name)
         keys_below(figure, 3)
         sizes = "; ".join(f"{name} {watts(float(np.sqrt((t[0][zone] ** 2).mean())))}" for name, t in models.items())
-        pictures.append(picture(figure, f"Missing heat of zone {zone} over time, root mean square: {sizes}"))
+        pictures.append(picture(figure, f"Missing heat of zone {zone} over time, root mean square: {sizes}", zoom=True))
     return pictures
 
 

@@ -286,5 +286,5 @@ def zone_panels(series: Series, zones: Sequence[str], errors: Mapping[str, float
         axes.set_ylabel("[°C]", fontsize=8)
         axes.tick_params(labelsize=7)
         alt = f"Measured and simulated temperature of zone {zone}, mean absolute error {errors[zone]:.2f} K"
-        pictures.append(picture(figure, alt))
+        pictures.append(picture(figure, alt, zoom=True))
     return pictures

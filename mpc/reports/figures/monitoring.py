@@ -5,6 +5,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from calibration.monitoring.monitor import Monitoring
+from mpc.reports.diagnosis_words import called
 from mpc.reports.figures import style
 from mpc.reports.figures.style import MEASURED, MUTED, SIMULATED, WARNING, Picture, keys_below, picture, styled
 
@@ -31,7 +32,7 @@ def time_line(found: Monitoring) -> list[Picture]:
         begin, end = x[min(e.since, len(x) - 1)], x[-1] if e.end is None else x[min(e.end, len(x) - 1)]
         bars.barh(row, end - begin, left=begin, height=0.6, color=WARNING if e.end is None else SIMULATED)
         bars.plot(x[min(e.alarm, len(x) - 1)], row, "k|", markersize=10)
-        words = f"{e.effect} {', '.join(e.zones)} "
+        words = f"{called(e.effect, e.zones)} "
         late = begin > x[0] + 0.5 * (x[-1] - x[0])
         bars.text(begin if late else end, row, words if late else f" {words}", va="center", fontsize=8,
                   ha="right" if late else "left", clip_on=not late and e.end is not None)  # fmt: skip
@@ -50,4 +51,4 @@ def time_line(found: Monitoring) -> list[Picture]:
     error.set(title="Mean absolute error by week", ylabel="[K]")
     error.set_ylim(bottom=0.0)
     keys_below(figure, 2)
-    return [picture(figure, "Changes, evidence by day and errors by week, over time")]
+    return [picture(figure, "Changes, evidence by day and errors by week, over time", zoom=True)]

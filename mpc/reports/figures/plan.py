@@ -80,7 +80,7 @@ def _error_colour(error: float, scale: float) -> Colour:
 
 def _ink_on(colour: Colour) -> str:
     """Dark or white text, whichever reads better on a colour."""
-    return "white" if 0.299 * colour[0] + 0.587 * colour[1] + 0.114 * colour[2] < 0.5 else INK
+    return "white" if 0.299 * colour[0] + 0.587 * colour[1] + 0.114 * colour[2] < 0.5 else style.INK_ON_COLOUR
 
 
 @styled
@@ -99,7 +99,7 @@ def plan_drawings(plans: FloorPlans, orientation: float) -> list[Picture]:
         colours = {zone: _ZONES[i % len(_ZONES)] for i, zone in enumerate(floor.zone_names)}
         labels = {zone: (zone, colours[zone]) for zone in floor.zone_names}
         figure, _ = _canvas(floor, plans.cell_size, orientation, _filled(floor, colours), f"floor {floor.name}", labels)
-        drawn.append(picture(figure, f"Plan of floor {floor.name} with {len(labels)} zones"))
+        drawn.append(picture(figure, f"Plan of floor {floor.name} with {len(labels)} zones", phone=False))
     return drawn
 
 
@@ -150,7 +150,7 @@ def floor_maps(
         _error_bar(figure, axes, scale)
         worst = max(floor.zone_names, key=lambda z: np.nan_to_num(abs(by_zone[z]), nan=-1.0))
         alt = f"Error on floor {floor.name}, {title}; largest in zone {worst}: {_signed_kelvin(by_zone[worst])}"
-        drawn.append(picture(figure, alt))
+        drawn.append(picture(figure, alt, phone=False))
     return drawn
 
 
@@ -185,7 +185,7 @@ def heat_maps(
         shades = ScalarMappable(Normalize(0.0, top), HEAT_COLOURS)
         _colour_bar(figure, axes, shades, "missing heat, root mean square [W]")
         listed = "; ".join(f"{z} {watts(by_zone[z])}" for z in floor.zone_names)
-        drawn.append(picture(figure, f"Missing heat on floor {floor.name}, {title}: {listed}"))
+        drawn.append(picture(figure, f"Missing heat on floor {floor.name}, {title}: {listed}", phone=False))
     return drawn
 
 
@@ -327,7 +327,7 @@ def tile_map(zones: tuple[str, ...], areas: FloatArray, error: FloatArray, title
     axes.set_axis_off()
     _error_bar(figure, axes, scale)
     listed = "; ".join(f"{z} {_signed_kelvin(e)}" for z, e in zip(zones, error, strict=True) if np.isfinite(e))
-    return [picture(figure, f"Error of each zone, {title}: {listed}")]
+    return [picture(figure, f"Error of each zone, {title}: {listed}", phone=False)]
 
 
 def _squarify(sizes: FloatArray, box: Box) -> list[Box]:

@@ -3,11 +3,11 @@
 import base64
 import io
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
-from typing import ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 import matplotlib as mpl
 import numpy as np
@@ -15,8 +15,12 @@ import pandas as pd
 from matplotlib import dates
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
+from mpc.reports.display import Display, display
+from mpc.reports.figures.adapt import WIDEST, for_dark, for_phone, in_units
+from mpc.reports.figures.zoom import zoomable
 from thermal._types import FloatArray
 
 P = ParamSpec("P")
@@ -24,6 +28,12 @@ T = TypeVar("T")
 
 #: Measured is blue and simulated orange, as in the paper, from a palette that the colour-blind can tell apart.
 MEASURED, SIMULATED, WARNING, MUTED, INK = "#0072B2", "#D55E00", "#C00028", "#8A8F98", "#22262B"
+
+#: Text on a light colour, which stays dark on a dark page too.
+INK_ON_COLOUR = "#22262C"
+
+#: Areas with more corners than this are painted as pixels, which keeps pages of long runs small.
+_MOST_CORNERS = 3000
 
 #: Zero of the Celsius scale [K].
 CELSIUS = 273.15
@@ -48,11 +58,20 @@ class Picture:
         What it shows, for those who cannot see it.
     width : int
         Natural width [px].
+    narrow : str
+        Data URI of an SVG laid out for a phone; empty where the other one is narrow enough, or cannot be.
+    zoom : mapping of str to Any, optional
+        The same for plotly, where a reader would zoom.
+    is_map : bool
+        Whether it keeps its size on a phone, and is moved about.
     """
 
     source: str
     alt: str
     width: int
+    narrow: str = ""
+    zoom: Mapping[str, Any] | None = None
+    is_map: bool = False
 
 
 def styled(function: Callable[P, T]) -> Callable[P, T]:
@@ -76,21 +95,57 @@ def styled(function: Callable[P, T]) -> Callable[P, T]:
     return drawn
 
 
-def picture(figure: Figure, alt: str) -> Picture:
-    """Turn a figure into an SVG that a page holds itself.
+def picture(figure: Figure, alt: str, *, zoom: bool = False, phone: bool = True) -> Picture:
+    """Turn a figure into SVGs that a page holds itself, in the units that are shown.
 
     Parameters
     ----------
     figure : Figure
-        Of Matplotlib.
+        Of Matplotlib, in SI units; it is laid out anew.
     alt : str
         What it shows, for those who cannot see it.
+    zoom : bool
+        Whether readers would zoom: lines and bands over time.
+    phone : bool
+        Whether it may be laid out anew for a phone; a map, whose text fits its rooms, may not.
     """
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
-    drawn = buffer.getvalue()
-    encoded = base64.b64encode(drawn[drawn.index(b"<svg") :]).decode("ascii")  # without the address of a DTD
-    return Picture(f"data:image/svg+xml;base64,{encoded}", alt, round(figure.get_size_inches()[0] * 96))
+    shown = display()
+    for area in figure.findobj(PolyCollection):
+        area.set_rasterized(sum(len(path.vertices) for path in area.get_paths()) > _MOST_CORNERS)  # type: ignore[attr-defined]
+    interactive = None
+    if zoom:
+        figure.draw_without_rendering()
+        interactive = zoomable(figure, shown)
+    if shown.converts:
+        in_units(figure, shown)
+    if shown.figures != "page":
+        shown.drawn.append((_short(alt), _file(figure, shown)))
+    width, source, narrow = float(figure.get_size_inches()[0]), _uri(figure), ""
+    if phone and width > WIDEST:
+        for_phone(figure)
+        narrow = _uri(figure)
+    return Picture(source, alt, round(width * 96), narrow, interactive, not phone)
+
+
+def _file(figure: Figure, shown: Display) -> bytes:
+    """Drawing for a file of its own, on white."""
+    stream = io.BytesIO()
+    metadata = {"Date": None, "Creator": None} if shown.figures == "svg" else None
+    figure.savefig(stream, format=shown.figures, dpi=200, facecolor="white", metadata=metadata)
+    return stream.getvalue()
+
+
+def _short(alt: str) -> str:
+    """First words of a description, for the name of a file."""
+    return alt.partition(";")[0].partition(",")[0].partition(":")[0]
+
+
+def _uri(figure: Figure) -> str:
+    stream = io.StringIO()
+    figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
+    drawn = stream.getvalue()
+    encoded = base64.b64encode(for_dark(drawn[drawn.index("<svg") :]).encode()).decode("ascii")  # no address of a DTD
+    return f"data:image/svg+xml;base64,{encoded}"
 
 
 def panel(width: float, height: float, *, title: str = "", xlabel: str = "", ylabel: str = "") -> tuple[Figure, Axes]:
