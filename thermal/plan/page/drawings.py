@@ -1,7 +1,7 @@
 """Uploaded drawings, and the floors that are read from them."""
 
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -19,6 +19,7 @@ from thermal.plan.folder import png_of
 from thermal.plan.guard import MOST_BYTES, checked_file, inside_folder
 from thermal.plan.list import FloorEntry, read_floor
 from thermal.plan.page.draft import Draft, DraftFloor, Picture, encode_floor
+from thermal.plan.page.jobs import Progress
 from thermal.plan.page.store import write_whole
 from thermal.plan.survey import CODE_KINDS, OUTSIDE_LABEL, WALL_LABEL, FloorSurvey, read_codes
 from thermal.plan.vector import VECTOR_KINDS
@@ -157,8 +158,19 @@ class Upload:
             One of its family, by what is wrong; nothing is kept then.
         """
         sheet = look_at(self.close())
-        self.path.replace(self._target)
+        self.keep()
         return sheet
+
+    def keep(self) -> Path:
+        """Keep it as it is, in place of one of the same name.
+
+        Returns
+        -------
+        Path
+            Where it is now.
+        """
+        self.path.replace(self._target)
+        return self._target
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -199,8 +211,6 @@ def look_at(path: Path, page: int = 1, dots_per_inch: float = 150.0) -> _Sheet:
         return _Sheet(file.name, "codes")
     return _Sheet(file.name, "vector")
 
-
-Progress = Callable[[str, int, int], None]
 
 _INK, _WALL, _PAPER = 90, 150, 255  # greys of the picture of a drawing that is no image
 
