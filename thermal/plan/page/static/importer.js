@@ -5,9 +5,10 @@ import { byId, closeDialog, el, field, openDialog, select as choice, toast } fro
 import { decodeFloor } from "./grid.js";
 import { takeList } from "./panels.js";
 import { change, page, save, tell } from "./store.js";
+import { takeTable } from "./telemetry.js";
 
 const DRAWINGS = [".png", ".jpg", ".jpeg", ".pdf", ".dxf", ".csv", ".npy", ".npz"];
-const LISTS = [".ttl", ".json", ".zinc"];
+const LISTS = [".ttl", ".json", ".zinc"], TABLES = [".parquet", ".xlsx", ".txt"];
 const sheets = []; // what is to be made floors of
 let chosen = null;
 
@@ -36,12 +37,16 @@ function addSheet(found) {
 
 const isCodes = async (file) => /^[\s\d,;.eE+-]*$/.test((await file.slice(0, 400).text()).replace(/^\ufeff/, ""));
 
+// Whether a CSV has a time stamp early in its second row: a table of telemetry, no list of devices.
+const isTable = async (file) => /^[^\n]*\n([^\n,;\t]*[,;\t]){0,2}"?(\d{4}-\d\d?-\d\d?|\d\d?[./]\d\d?[./]\d{2,4}|\d{10,13}(?=[,;\t"]))/.test(await file.slice(0, 400_000).text());
+
 // Files from the dialog, or dropped on the page: drawings become floors, lists become devices.
 export async function importFiles(files) {
   let drawings = 0;
   for (const file of files) {
     const kind = suffix(file.name);
     try {
+      if (TABLES.includes(kind) || (kind === ".csv" && (await isTable(file)))) { await takeTable(file); continue; }
       if (LISTS.includes(kind) || (kind === ".csv" && !(await isCodes(file)))) { await takeList(file); continue; }
       status(`Reading ${file.name}…`);
       addSheet(await api.upload("api/drawings", file));
