@@ -205,6 +205,7 @@ def import_list(desk: LabelDesk, path: Path, progress: Progress) -> None:
         "orientation": round((turned + 180.0) % 360.0 - 180.0, 2),
         "cell_size": found.cell_size,
         "floors": found.floors,
+        "glazing": found.glazing,
     }
     desk.store.save(desk.store.draft.model_copy(update=changes))
 
