@@ -59,7 +59,7 @@ class FloorEntry(Entry):
     smallest_room, smallest_zone
         As in `PlanSettings` [m2].
     read_text
-        Whether texts in rooms become their names. Default: those of a DXF or PDF; true: those of a picture, too, by OCR.
+        Whether texts in rooms become their names. Default: of a DXF and a PDF; true: of a picture, too, by OCR.
     window_height
         Of windows that a DXF shows [m].
     """

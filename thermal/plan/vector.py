@@ -97,11 +97,11 @@ def read_dxf(
     angle, placement, shape = _upright(content, straighten, metres, file.name)
     settings = settings or PlanSettings()
     survey = _survey(content, placement, shape, angle, settings, file.name)
-    if content.windows:
-        turned = [line @ placement[:2, :2].T + placement[:2, 2] for line in content.windows]
-        survey = replace(survey, windows=find_windows(turned, survey, settings.thickest_wall))
-    named = name_rooms(survey, content.texts)
     own = survey.placement if survey.placement is not None else np.eye(3)
+    if content.windows:
+        upright = [line @ own[:2, :2].T + own[:2, 2] for line in content.windows]
+        survey = replace(survey, windows=find_windows(upright, survey, settings.thickest_wall))
+    named = name_rooms(survey, content.texts)
     return replace(named, placement=own @ np.diag([metres, metres, 1.0]))
 
 

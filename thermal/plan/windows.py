@@ -1,9 +1,7 @@
 """Windows that a vector drawing shows: which rooms they belong to, on which facade, and how wide they are."""
 
 import math
-from collections.abc import Mapping, Sequence
-
-import numpy as np
+from collections.abc import Iterator, Mapping, Sequence
 
 from thermal._types import FloatArray
 from thermal.case.plan import FACADE_STEPS
@@ -14,7 +12,7 @@ from thermal.plan.survey import OUTSIDE_LABEL, WALL_LABEL, FloorSurvey, Window
 WINDOW_HEIGHT = 1.5
 
 _TOUCH = 0.06  # m: lines nearer to each other belong to one window: its panes, its frame, its sill
-_STEP = 0.1  # m along a window at which both of its sides are looked at
+_STEP = 0.05  # m along a window at which both of its sides are looked at
 _NARROWEST = 0.3  # m: shorter marks are frames and posts
 _BEYOND = 0.3  # m beyond the thickest wall at which a room, and the outside, are looked for
 
@@ -34,39 +32,41 @@ def find_windows(lines: Sequence[FloatArray], survey: FloorSurvey, thickest_wall
     Returns
     -------
     tuple of Window
-        One a window and room behind it; what has rooms on both of its sides is none.
+        One a room and facade, as wide as all of its windows there together; what has rooms on both sides is none.
     """
     shapely = extra("shapely")
     reach = _TOUCH / 2.0 / survey.pixel
     drawn = shapely.unary_union([shapely.LineString(line).buffer(reach) for line in lines if len(line) > 1])
-    found: list[Window] = []
+    covered: dict[tuple[int, str], set[int]] = {}  # steps along the facade: panes and sills lie over each other
+    rooms: dict[int, tuple[float, float]] = {}
     for part in getattr(drawn, "geoms", [drawn]):
         if not part.is_empty:
             left, top, right, bottom = part.bounds
-            found += _seen((left + reach, top + reach, right - reach, bottom - reach), survey, thickest_wall)
-    return tuple(found)
+            box = (left + reach, top + reach, right - reach, bottom - reach)
+            for step, facade, room, point in _seen(box, survey, thickest_wall):
+                covered.setdefault((room, facade), set()).add(step)
+                rooms.setdefault(room, point)
+    return tuple(Window(rooms[room], facade, len(steps) * _STEP) for (room, facade), steps in covered.items())
 
 
-def _seen(box: tuple[float, float, float, float], survey: FloorSurvey, thickest_wall: float) -> list[Window]:
-    """Look through a window from place to place along it."""
+def _seen(
+    box: tuple[float, float, float, float], survey: FloorSurvey, thickest_wall: float
+) -> Iterator[tuple[int, str, int, tuple[float, float]]]:
+    """Look through a window from step to step along it: step, facade, room behind it and a point there."""
     left, top, right, bottom = box
-    lies = right - left >= bottom - top
-    length = max(right - left, bottom - top) * survey.pixel
-    if length < _NARROWEST:
-        return []
-    count = max(1, round(length / _STEP))
-    along = (np.arange(count) + 0.5) / count
-    middle = ((left + right) / 2.0, (top + bottom) / 2.0)
+    lies, pixel = right - left >= bottom - top, survey.pixel
+    first, last = (left, right) if lies else (top, bottom)
+    if (last - first) * pixel < _NARROWEST:
+        return
+    across = (top + bottom) / 2.0 if lies else (left + right) / 2.0
     facades = ("north", "south") if lies else ("west", "east")
-    seen: dict[tuple[int, str], tuple[int, tuple[float, float]]] = {}
-    for share in along:
-        place = (left + share * (right - left), middle[1]) if lies else (middle[0], top + share * (bottom - top))
+    for step in range(round(first * pixel / _STEP), round(last * pixel / _STEP)):
+        along = (step + 0.5) * _STEP / pixel
+        place = (along, across) if lies else (across, along)
         sides = [_beside(place, FACADE_STEPS[facade], survey, thickest_wall) for facade in facades]
         for facade, (outer, _), (inner, point) in zip(facades, sides, sides[::-1], strict=True):
             if outer == OUTSIDE_LABEL and inner > 0:
-                times, first = seen.get((inner, facade), (0, point))
-                seen[inner, facade] = (times + 1, first)
-    return [Window(point, facade, times * length / count) for (_, facade), (times, point) in seen.items()]
+                yield step, facade, inner, point
 
 
 def _beside(

@@ -23,7 +23,7 @@ _LONGEST = 60  # characters of a name
 _SURE = 60.0  # of 100: confidence of a word that OCR reads; below it, strokes of walls and doors become words too
 #: What stands in rooms and is no name of one: areas, lengths, heights, scales; numbers alone are names.
 _MEASURE = re.compile(
-    r"^[\W_]*([<>=~±øØ]?\s*\d+([.,]\d+)+|\d+([.,]\d+)?\s*(m|mm|cm|m2|m²|qm|sqm|sf|sq\.?\s?ft\.?|ft2?|ft²|['’\"″])|1\s*:\s*\d+)[\W_]*"
+    r"^[\W_]*(h\s*=\s*\d+([.,]\d+)?|[<>=~±øØ]?\s*\d+([.,]\d+)+|\d+([.,]\d+)?\s*(m|mm|cm|m2|m²|qm|sqm|sf|sq\.?\s?ft\.?|ft2?|ft²|['’\"″])|1\s*:\s*\d+)[\W_]*"
     r"(m|mm|cm|m2|m²|qm|sqm|sf|sq\.?\s?ft\.?|ft2?|ft²)?[\W_]*$",
     re.IGNORECASE,
 )

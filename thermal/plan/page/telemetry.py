@@ -285,8 +285,8 @@ class TelemetryDesk:
         Returns
         -------
         dict
-            Span and step, points with a small picture and the number of flaws of each, anomalies, remarks; ``points`` is
-            empty without telemetry.
+            Span and step; points, with a small picture and the number of flaws of each; anomalies; remarks. Without
+            telemetry, ``points`` is empty.
 
         Raises
         ------
