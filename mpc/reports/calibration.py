@@ -15,7 +15,7 @@ from mpc.reports.figures.calibration import MOST_ROWS, paper_values, parameter_r
 from mpc.reports.figures.errors import error_band, error_growth, median_run
 from mpc.reports.figures.field import spatial_field
 from mpc.reports.identifiability import information_content, information_sentences
-from mpc.reports.page import counted, duration, estimated_sentences, in_words, kelvin, render
+from mpc.reports.page import case_warnings, counted, duration, estimated_sentences, in_words, kelvin, render
 from mpc.reports.residuals import diagnostics_content
 from thermal.case.case import Case
 from thermal.model.case_replay import Inputs, replay_inputs
@@ -212,6 +212,7 @@ def _content(result: CalibrationResult, case: Case, grid: SymbolicModel, inputs:
         "after": after,
         "subtitle": evaluation.subtitle(case, after),
         "verdict": calibration_verdict(result),
+        "warnings": case_warnings(case),
         "fine": result.solver.success and after.metrics.mae < before.metrics.mae,
         "parts": [(title, result.uncalibrated[k].metrics, result.calibrated[k].metrics,
                    evaluation.unchanged_error(result.calibrated[k])) for title, k in parts.items()],

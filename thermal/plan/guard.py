@@ -117,7 +117,7 @@ def checked_file(path: Path, kinds: tuple[str, ...]) -> Path:
     # A PDF may have some bytes before its signature (ISO 32000-1, annex H, note 13).
     fits = known is None or (known[0] in start if suffix == ".pdf" else start.startswith(known))
     found = f"a file that begins with {start[:8]!r}" if start else "an empty file"
-    PlanError.unless(fits and start, path.name, f"a {suffix[1:].upper()} file", found, "export the drawing anew")
+    PlanError.unless(fits and start, path.name, f"a {suffix[1:].upper()} file", found, "export it anew")
     return path.absolute()
 
 

@@ -109,7 +109,8 @@ class TelemetryDesk:
         PlanError
             It is not what its name says.
         """
-        checked_file(upload.close(), TELEMETRY_KINDS)
+        file = checked_file(upload.close(), TELEMETRY_KINDS)
+        PlanError.unless(file.name != _POINTS, file.name, "another name", "that of the page's own list", "rename it")
         kept = upload.keep()
         for file in self._files():
             if file.name != kept.name:
