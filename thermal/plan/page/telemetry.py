@@ -37,6 +37,9 @@ _MOST_MARKS = 500  # of one picture
 #: What an upload may end in.
 TELEMETRY_KINDS = SUFFIXES
 
+#: Remark of a column that a person has left out.
+LEFT_OUT = "left out"
+
 _POINTS, _TAKEN = "points.csv", "taken.json"
 
 
@@ -212,12 +215,14 @@ class TelemetryDesk:
         for point in points:
             where = f"column {point.column[:80]!r}"
             PlanError.unless(point.column in table.series, where, "a column of the table", "none of that name")
-            if point.entity and point.point:
+            if point.entity:
                 PlanError.unless_known(point.entity, known, where, "a device, a zone or the weather station")
+            if point.point:
                 PlanError.unless_known(point.point, POINT_TYPES, where, "a point type")
-                said[point.column] = PointMatch(point.column, point.entity, point.point, 1.0, "", point.unit)
-            else:
-                said[point.column] = PointMatch(point.column, "", "", 0.0, "left out", point.unit)
+            lacking = "" if point.entity else "whose it is is not said yet", "" if point.point else "no point type yet"
+            remark = LEFT_OUT if all(lacking) else "".join(lacking)
+            given = (point.entity, point.point, 0.0 if remark else 1.0, remark, point.unit)
+            said[point.column] = PointMatch(point.column, *given)
         matches = tuple(said.get(match.column, match) for match in table.matches)
         self._table = replace(table, matches=matches)
         self._remember(matches)

@@ -121,11 +121,15 @@ def test_what_a_person_says_counts_and_is_remembered(labelled: Any, desk: LabelD
     answer = labelled.put(labelled.at("api/telemetry/points"), json={"points": said})
     rows = {row["column"]: row for row in answer.json()["columns"]}
     assert rows["VAV_A Airflow"]["remark"] == "left out" and rows["Lobby lighting kWh"]["confidence"] == 1.0
+    half = {"points": [{"column": "VAV_B ZAT", "entity": "VAV_B"}]}
+    rows = labelled.put(labelled.at("api/telemetry/points"), json=half).json()["columns"]
+    assert {row["column"]: row["remark"] for row in rows}["VAV_B ZAT"] == "no point type yet"
     assert give(labelled, text_of(table()))["state"] == "done"
     again = {row["column"]: row for row in labelled.get(labelled.at("api/telemetry")).json()["table"]["columns"]}
     assert again["VAV_A Airflow"]["remark"] == "left out" and again["Lobby lighting kWh"]["entity"] == "B"
     points = {point["column"] for point in take(labelled)["result"]["points"]}
     assert f"B/{said[0]['point']}" in points and "VAV_A/supply_air_flowrate_sensor" not in points
+    assert not any(point.startswith("VAV_B/") for point in points)
 
 
 def test_a_second_table_replaces_the_first_and_a_file_of_somebody_else_stays(labelled: Any, desk: LabelDesk) -> None:

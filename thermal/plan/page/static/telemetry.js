@@ -157,11 +157,11 @@ function tablePart() {
   const table = now.state?.table;
   if (!table) return null;
   const rows = [...table.columns].sort((a, b) => isOut(b) - isOut(a) || a.confidence - b.confidence), used = rows.filter((row) => !isOut(row)).length;
-  const cell = (row, key, list) => el("td", {}, el("input", { type: "text", id: `${key} ${row.column}`, value: row.remark && !row.entity ? "" : row[key], list, disabled: off(), autocomplete: "off", "aria-label": `${key} of ${row.column}`, onchange: (e) => correct(row.column, { [key]: e.target.value.trim() }) }));
+  const cell = (row, key, list) => el("td", {}, el("input", { type: "text", id: `${key} ${row.column}`, value: row[key], list, disabled: off(), autocomplete: "off", "aria-label": `${key} of ${row.column}`, onchange: (e) => correct(row.column, { [key]: e.target.value.trim() }) }));
   const rowOf = (row) => el("tr", { class: isOut(row) ? "out" : "" }, nameCell(row, "table"), el("td", {}, spark(row)), cell(row, "entity", "telemetry-entities"), cell(row, "point", "telemetry-points"),
     el("td", {}, el("input", { type: "text", class: "unit", id: `unit ${row.column}`, value: row.unit, placeholder: now.state.points[row.point] || "", disabled: off(), "aria-label": `Unit of ${row.column}`, onchange: (e) => correct(row.column, { unit: e.target.value.trim() }) })),
-    el("td", { class: "soft" }, row.remark ? `left out: ${row.remark}${row.heat ? " – but it tells of heat" : ""}` : row.confidence === 1 ? "sure" : `${Math.round(100 * row.confidence)} % alike`),
-    el("td", {}, !isOut(row) && el("button", { type: "button", disabled: off(), "aria-label": `Leave ${row.column} out`, onclick: () => correct(row.column, { entity: "", point: "" }) }, "Leave out")));
+    el("td", { class: "soft" }, row.remark ? `${row.remark === "left out" ? "" : "left out: "}${row.remark}${row.heat ? " – but it tells of heat" : ""}` : row.confidence === 1 ? "sure" : `${Math.round(100 * row.confidence)} % alike`),
+    el("td", {}, isOut(row) ? row.entity && row.point && el("button", { type: "button", disabled: off(), "aria-label": `Take ${row.column} for that`, onclick: () => correct(row.column, {}) }, "Take it") : el("button", { type: "button", disabled: off(), "aria-label": `Leave ${row.column} out`, onclick: () => correct(row.column, { entity: "", point: "" }) }, "Leave out")));
   const title = `${table.where}: ${used} of ${rows.length} columns are matched`;
   const box = isTaken() ? el("details", { open: now.open, ontoggle: (e) => { now.open = e.target.open; } }, el("summary", { id: "telemetry-again" }, `${title}; change that`)) : el("section", {}, el("h3", {}, title));
   box.append(
