@@ -217,8 +217,8 @@ def assemble_plans(
         raise lost or LostRoomError("no cell size fits")
     for plan in best[1].plans.floors:
         check_plan(plan.tokens, f"floor {plan.name!r}")
-    drawn = {zone: sides for floor in placed for zone, sides in floor.glazing.items()}
-    glazing = clipped_glazing(drawn, facade_areas(best[1].plans)) if drawn else {}
+    shown = {zone: sides for floor in placed for zone, sides in floor.glazing.items()}
+    glazing = clipped_glazing(shown, facade_areas(best[1].plans)) if shown else {}
     return replace(best[1], plans=replace(best[1].plans, glazing=glazing))
 
 

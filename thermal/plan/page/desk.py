@@ -71,7 +71,7 @@ class LabelDesk:
         with self._lock:
             draft = self.store.draft
             saver = {"saved_by": self._saver, "saved_since": self._since}
-            shown = {"draft": draft.model_dump(by_alias=True), "reports": self.reports.kinds}
+            shown: dict[str, Any] = {"draft": draft.model_dump(by_alias=True), "reports": self.reports.kinds}
             shown |= {"running": self.jobs.unfinished()}
             return {**shown, **saver, **self._verdict(draft)}
 
