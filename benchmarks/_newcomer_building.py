@@ -185,7 +185,7 @@ def walk_page(
             if address is None:
                 raise SystemExit(f"{' '.join(command)}: expected the page's address, found {lines!r}")
             person = Path(__file__).with_name("newcomer_person.mjs")
-            script = [node, str(person), address[0], str(home / "drawings"), str(modules), chromium]
+            script = [node, str(person), address[0], str(home / "drawings"), str(modules), chromium, str(server.pid)]
             if pictures is not None:
                 pictures.mkdir(parents=True, exist_ok=True)
                 script.append(str(pictures))

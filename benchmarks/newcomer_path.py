@@ -3,10 +3,10 @@
 Everything is done in a new folder, by the commands that README and documentation say, in a fresh virtual environment:
 
 1. First visit: clone, virtual environment, install, `buildingmpc demo`; the line of the README is taken apart and run.
-2. Own building, where node and chromium are installed: a scripted person on the labelling page in a real browser
-   (`newcomer_person.mjs`), from two PNGs, a list of devices and an export of the automation system to a calibrated and
-   diagnosed model. Actions and waits are counted; at human speed an action takes `HUMAN` seconds. Without a browser,
-   and beside it, the commands do the same as far as they reach.
+2. Own building, where node and chromium are installed, on Linux: a scripted person on the labelling page in a real
+   browser (`newcomer_person.mjs`), from two PNGs, a list of devices and an export of the automation system to a
+   calibrated and diagnosed model. Actions and waits are counted; at human speed an action takes `HUMAN` seconds.
+   Without a browser, and beside it, the commands do the same as far as they reach.
 
 The building is the generated pilot, drawn by `tests/browser/pilot.py`; its telemetry is that of `generate_twin`:
 the grid model under thermostats with parameters drawn from a seed, unmeasured heat and noise. Making it is not timed:
@@ -194,18 +194,20 @@ def report(steps: Sequence[Step], found: dict[str, Any]) -> str:
 
 def person(steps: Sequence[dict[str, Any]]) -> str:
     """Lay out what the person did and waited for on the page."""
-    rows, whole = [], {"clicks": 0, "fields": 0, "waited": 0.0}
+    rows, whole = [], {"clicks": 0, "fields": 0, "waited": 0.0, "computed": 0.0}
     for step in steps:
         rows.append([step["name"], *_counts(step)])
         whole = {key: whole[key] + step[key] for key in whole}
     rows.append(["**all**", *(f"**{cell}**" for cell in _counts(whole))])
-    head = ["on the page", "clicks", "fields", f"at {HUMAN:g} s each [min]", "waiting [min]", "together [min]"]
+    acted, times = f"at {HUMAN:g} s each [min]", ["waiting [min]", "together [min]", "CPU of the server [min]"]
+    head = ["on the page", "clicks", "fields", acted, *times]
     return markdown(head, rows)
 
 
 def _counts(step: dict[str, Any]) -> list[str]:
     acted, waited = HUMAN * (step["clicks"] + step["fields"]) / 60.0, step["waited"] / 60.0
-    return [f"{step['clicks']}", f"{step['fields']}", f"{acted:.1f}", f"{waited:.1f}", f"{acted + waited:.1f}"]
+    counts = [f"{step['clicks']}", f"{step['fields']}"]
+    return counts + [f"{minutes:.1f}" for minutes in (acted, waited, acted + waited, step["computed"] / 60.0)]
 
 
 def short(command: str) -> str:

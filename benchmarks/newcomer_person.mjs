@@ -1,7 +1,8 @@
 // Goes from two PNGs, a list of devices and an export to a calibrated, diagnosed model on the labelling page, as a person
 // does, and counts what that person does and waits for.
-// node newcomer_person.mjs ADDRESS FOLDER MODULES CHROMIUM [PICTURES]; writes the counts to stdout as JSON. FOLDER holds
-// the drawings, devices.csv, export.csv and truth.json, which stands for what the person knows of the building.
+// node newcomer_person.mjs ADDRESS FOLDER MODULES CHROMIUM PROCESS [PICTURES]; writes the counts to stdout as JSON. FOLDER
+// holds the drawings, devices.csv and truth.json, which stands for what the person knows of the building; export.csv lies
+// beside it. PROCESS is the server's: its CPU time, with that of its children, is that of each step's computing.
 //
 // An action is a click, a field that is filled in (the way to it and the typing together) or a step of the system's
 // dialog for files, which takes two beside the button: the file, and "Open". A wait is counted from the action until the
@@ -10,7 +11,7 @@ import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { join } from "node:path";
 
-const [, , address, folder, modules, executablePath, pictures] = process.argv;
+const [, , address, folder, modules, executablePath, server, pictures] = process.argv;
 const { chromium } = createRequire(join(modules, "index.js"))("playwright-core");
 const truth = JSON.parse(readFileSync(join(folder, "truth.json"), "utf8"));
 const LONG = { timeout: 3_600_000 };
@@ -22,7 +23,13 @@ const page = await context.newPage();
 page.on("pageerror", (error) => faults.push(error.message));
 page.on("console", (message) => { if (message.type() === "error") faults.push(message.text()); });
 
-const step = (name) => steps.push({ name, clicks: 0, fields: 0, waited: 0 });
+// CPU time of the server and of its children that have ended [s]; proc(5): fields 14 to 17 in hundredths of a second.
+const spent = () => readFileSync(`/proc/${server}/stat`, "utf8").split(") ")[1].split(" ").slice(11, 15).reduce((sum, ticks) => sum + Number(ticks) / 100, 0);
+
+function step(name) {
+  if (steps.length) now().computed = spent() - now().computed;
+  if (name) steps.push({ name, clicks: 0, fields: 0, waited: 0, computed: spent() });
+}
 const now = () => steps[steps.length - 1];
 const picture = async (name, of = page) => { if (pictures) await of.screenshot({ path: join(pictures, `${name}.png`) }); };
 
@@ -151,6 +158,7 @@ await placeDevices();
 const [matched, checked] = await giveTelemetry();
 const calibration = await makeReport("calibrate", "#telemetry-calibrate");
 const diagnosis = await makeReport("diagnose", "#make-diagnose");
+step(null);
 await browser.close();
 if (faults.length) throw new Error(`expected no error in the page's console, found ${faults.join("; ")}`);
 process.stdout.write(JSON.stringify({ steps, matched, checked, calibration, diagnosis }));
