@@ -19,7 +19,8 @@ import yaml
 from _table import ROOT
 
 from calibration import Interval, evaluate_case
-from thermal import load_case, save_case
+from thermal import FloorPlans, load_case, save_case
+from thermal.case.plan import FACADE_STEPS, facade_areas
 from thermal.pilot.building import pilot_building
 from thermal.pilot.twin import TwinSettings, TwinTruth, generate_twin
 from thermal.pilot.weather import MOUNTAIN_VIEW
@@ -108,8 +109,22 @@ def raise_building(home: Path, size: Size) -> Standing:
     export_telemetry(frame, home / "export.csv")
     end = frame.index[-1].floor("D")
     days = tuple(stamp.strftime("%Y-%m-%dT%H:%M") for stamp in (end - pd.Timedelta(days=1), end))
-    glazing = building.geometry.glazing  # type: ignore[union-attr]
-    return Standing(size, drawn["areas"], glazing, truth, len(drawn["devices"]), (days[0], days[1]))
+    plans = building.geometry
+    if not isinstance(plans, FloorPlans):
+        raise SystemExit("pilot: expected floor plans")
+    known = drawn | {"glazing": glazing_by_facade(plans), "place": MOUNTAIN_VIEW.model_dump()}
+    (drawings / "truth.json").write_text(json.dumps(known), encoding="utf-8")
+    return Standing(size, drawn["areas"], plans.glazing, truth, len(drawn["devices"]), (days[0], days[1]))
+
+
+def glazing_by_facade(plans: FloorPlans) -> dict[str, float]:
+    """Glazed share of each facade of the whole building [-], which is what a person reads off it from the street."""
+    facades = facade_areas(plans)
+    found = {}
+    for side in FACADE_STEPS:
+        whole = sum(areas[side] for areas in facades.values())
+        found[side] = sum(glass.get(side, 0.0) for glass in plans.glazing.values()) / whole if whole else 0.0
+    return found
 
 
 def _drawing_script() -> Any:
@@ -153,8 +168,10 @@ def browser_programs() -> tuple[str, str, Path] | None:
     return node, chromium, modules
 
 
-def label_on_page(command: Sequence[str], home: Path, environment: Mapping[str, str]) -> dict[str, Any]:
-    """Serve the page and label the building on it by a script; gives what the script measured."""
+def walk_page(
+    command: Sequence[str], home: Path, environment: Mapping[str, str], pictures: Path | None = None
+) -> dict[str, Any]:
+    """Serve the page and let a scripted person go all the way on it; gives what the script counted."""
     programs = browser_programs()
     if programs is None:
         raise SystemExit("expected node, chromium and playwright-core; run tests/browser/install.sh")
@@ -167,17 +184,14 @@ def label_on_page(command: Sequence[str], home: Path, environment: Mapping[str, 
             address = re.search(r"http://127\.0\.0\.1:\d+/\S+/", lines)
             if address is None:
                 raise SystemExit(f"{' '.join(command)}: expected the page's address, found {lines!r}")
-            script = [
-                node,
-                str(BROWSER / "label_pilot.mjs"),
-                address[0],
-                str(home / "drawings"),
-                str(modules),
-                chromium,
-            ]
-            done = subprocess.run(script, capture_output=True, text=True, timeout=3600)
+            person = Path(__file__).with_name("newcomer_person.mjs")
+            script = [node, str(person), address[0], str(home / "drawings"), str(modules), chromium, str(server.pid)]
+            if pictures is not None:
+                pictures.mkdir(parents=True, exist_ok=True)
+                script.append(str(pictures))
+            done = subprocess.run(script, capture_output=True, text=True, timeout=7200)
             if done.returncode:
-                raise SystemExit(f"label_pilot.mjs ended with {done.returncode}\n{done.stderr[-3000:]}")
+                raise SystemExit(f"newcomer_person.mjs ended with {done.returncode}\n{done.stderr[-3000:]}")
             server.send_signal(signal.SIGINT)
             server.wait(timeout=30)
         finally:
@@ -185,13 +199,13 @@ def label_on_page(command: Sequence[str], home: Path, environment: Mapping[str, 
     return json.loads(done.stdout)  # type: ignore[no-any-return]
 
 
-def near(home: Path, standing: Standing) -> dict[str, Any]:
+def near(home: Path, standing: Standing, case: Path, results: Path) -> dict[str, Any]:
     """Hold the calibrated simulator against the truth."""
     checked = json.loads((home / "check" / "check.json").read_text(encoding="utf-8"))
     areas = {zone["name"]: zone["floor_area"] for zone in checked["zones"]}
     if areas.keys() != standing.areas.keys():
         raise SystemExit(f"zones: expected those of the drawings, found {sorted(areas.keys() ^ standing.areas.keys())}")
-    found = json.loads((home / "results" / "calibration.json").read_text(encoding="utf-8"))
+    found = json.loads((results / "calibration.json").read_text(encoding="utf-8"))
     true = {p.name: float(value) for p, value in zip(standing.truth.parameters, standing.truth.theta, strict=True)}
     held = {
         name: lower <= true[name] <= upper
@@ -200,7 +214,7 @@ def near(home: Path, standing: Standing) -> dict[str, Any]:
         for lower, upper in [p["interval90"]]
     }
     (home / "true.json").write_text(json.dumps({"parameters": standing.truth.to_dict()["parameters"]}), "utf-8")
-    office = load_case(home / "office")
+    office = load_case(case)
     zone = office.building.location.timezone
     intervals = [
         Interval(*(pd.Timestamp(i[end]).tz_convert(zone) for end in ("start", "end")))

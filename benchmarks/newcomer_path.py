@@ -1,23 +1,22 @@
-"""How long a newcomer takes: from clone to the demo's report, and from PNGs to a calibrated simulator of one's own.
+"""How long a newcomer takes: from clone to the demo's report, and from PNGs to a diagnosed model of one's own.
 
 Everything is done in a new folder, by the commands that README and documentation say, in a fresh virtual environment:
 
 1. First visit: clone, virtual environment, install, `buildingmpc demo`; the line of the README is taken apart and run.
-2. Own building: the extras, a case of PNGs and a list of devices, its telemetry under names of a building automation
-   system, check, calibrate, simulate. The PNGs are put on the page by the script that tests the page in a browser
-   (`tests/browser/label_pilot.mjs`: every device by mouse or keys), where node and chromium are installed, and by
-   `import-plan` in any case.
+2. Own building, where node and chromium are installed, on Linux: a scripted person on the labelling page in a real
+   browser (`newcomer_person.mjs`), from two PNGs, a list of devices and an export of the automation system to a
+   calibrated and diagnosed model. Actions and waits are counted; at human speed an action takes `HUMAN` seconds.
+   Without a browser, and beside it, the commands do the same as far as they reach.
 
 The building is the generated pilot, drawn by `tests/browser/pilot.py`; its telemetry is that of `generate_twin`:
 the grid model under thermostats with parameters drawn from a seed, unmeasured heat and noise. Making it is not timed:
 the newcomer's building stands. As its truth is known, the calibrated one is held against it: areas of zones, the
-held-out error beside that at the true parameters, and how many 90 % intervals hold the truth.
-
-A person types more slowly than a script: what the table leaves out is thinking, and looking at the pages.
+held-out error beside that at the true parameters, and how many 90 % intervals hold the truth. On the page glazing is
+given by facade, as the mean of the building's zones, so that it is true on average only.
 
 Run: ``python benchmarks/newcomer_path.py --out results/newcomer [--publish]``; `--small` is an office of 12 zones,
-`--without-visit` leaves out clone, install and demo and uses this environment. Writes ``newcomer_path.json`` and
-``.md``; with ``--publish`` also the table between its marks.
+`--without-visit` leaves out clone, install and demo and uses this environment, `--pictures DIR` keeps what the person
+sees. Writes ``newcomer_path.json`` and ``.md``; with ``--publish`` also the table between its marks.
 """
 
 from __future__ import annotations
@@ -41,15 +40,18 @@ from _newcomer_building import (
     Size,
     Standing,
     browser_programs,
-    label_on_page,
     near,
     raise_building,
+    walk_page,
     with_glazing,
 )
 from _table import ROOT, markdown, write
 
 NAME = "newcomer_path"
 FIRST, OWN, ASIDE = "first visit", "own building", "beside it"
+
+#: What an action of a person takes on average, looking and thinking included [s], as the issue of the page sets it.
+HUMAN = 8.0
 
 
 @dataclass(frozen=True)
@@ -68,7 +70,9 @@ Run = Callable[[Sequence[str], Path], str]
 
 def execute(command: Sequence[str], folder: Path) -> str:
     """Run a command in a folder and give what it wrote; a failure ends the path with what it said."""
-    done = subprocess.run(list(command), cwd=folder, capture_output=True, text=True, env=environment())
+    fresh = Path(command[0]) != Path(sys.executable)
+    env = environment() if fresh else None  # of this environment, all that it finds its packages by
+    done = subprocess.run(list(command), cwd=folder, capture_output=True, text=True, env=env)
     if done.returncode:
         raise SystemExit(
             f"{' '.join(command)}\nended with {done.returncode}\n{done.stdout[-2000:]}{done.stderr[-2000:]}"
@@ -134,25 +138,35 @@ def visit(path: Walk, home: Path) -> Path:
     return clone
 
 
-def own_building(path: Walk, home: Path, tool: list[str], standing: Standing, browser: bool) -> dict[str, Any]:
+def own_building(
+    path: Walk, home: Path, tool: list[str], standing: Standing, browser: bool, pictures: Path | None = None
+) -> dict[str, Any]:
     """Go from drawings to a calibrated simulator; gives how near to the truth it is."""
     listed = ["import-plan", "drawings/plans.yaml", "--devices", "drawings/devices.csv", "--out", "by_command"]
     path.run(ASIDE if browser else OWN, "drawings to a case, by command", [*tool, *listed], home)
-    case, numbers = home / "by_command", {}
-    if browser:
-        case = home / "on_page"
-        with path.timed(OWN, "drawings to a case, on the page", "buildingmpc label on_page"):
-            numbers = label_on_page([*tool, "label", str(case), "--no-browser"], home, environment())
-    with_glazing(case, standing.glazing)
-    told = path.run(OWN, "telemetry", [*tool, "import-telemetry", case.name, "export.csv", "--out", "office"], home)
-    path.run(OWN, "check", [*tool, "check", "office", "--out", "check"], home)
+    numbers: dict[str, Any] = {}
     spacing = ["--dx", f"{standing.size.dx:g}"]
-    path.run(OWN, "calibrate", [*tool, "calibrate", "office", "--out", "results", *spacing], home)
+    case, results = home / "office", home / "results"
+    if browser:
+        case, results, spacing = home / "on_page", home / "on_page" / "labelling" / "reports" / "calibrate", []
+        with path.timed(OWN, "from drawings to a diagnosis, on the page, by a script", "buildingmpc label on_page"):
+            fresh = dict(os.environ) if tool[0] == sys.executable else environment()
+            numbers = walk_page([*tool, "label", str(case), "--no-browser"], home, fresh, pictures)
+        matched = numbers["matched"]
+    else:
+        with_glazing(home / "by_command", standing.glazing)
+        told = path.run(
+            OWN, "telemetry", [*tool, "import-telemetry", "by_command", "export.csv", "--out", "office"], home
+        )
+        matched = next(line for line in told.splitlines() if "columns matched" in line)
+    path.run(OWN, "check", [*tool, "check", case.name, "--out", "check"], home)
+    if not browser:
+        path.run(OWN, "calibrate", [*tool, "calibrate", "office", "--out", "results", *spacing], home)
     start, end = standing.last_day
-    span = ["--start", start, "--end", end, "--parameters", "results/calibration.json"]
-    path.run(OWN, "simulate a day", [*tool, "simulate", "office", *span, *spacing, "--out", "replay"], home)
-    matched = next(line for line in told.splitlines() if "columns matched" in line)
-    return {"page": numbers, "matched": matched} | near(home, standing)
+    found = results.relative_to(home) / "calibration.json"
+    span = ["--start", start, "--end", end, "--parameters", found.as_posix()]
+    path.run(OWN, "simulate a day", [*tool, "simulate", case.name, *span, *spacing, "--out", "replay"], home)
+    return {"page": numbers, "matched": matched} | near(home, standing, case, results)
 
 
 def report(steps: Sequence[Step], found: dict[str, Any]) -> str:
@@ -170,15 +184,30 @@ def report(steps: Sequence[Step], found: dict[str, Any]) -> str:
         f"Held-out error six hours ahead {found['mae']['before']:.2f} K before and {found['mae']['after']:.2f} K after "
         f"calibration, {found['mae']['truth']:.2f} K at the true parameters; {found['held']} of {found['parameters']} "
         "intervals of 90 % hold the truth.",
+        f"{os.cpu_count()} cores, load average {found['load']:.1f} at the end.",
     ]
+    text = markdown(["path", "step", "command", "wall [s]", "CPU [s]"], rows) + "\n"
     if found["page"]:
-        numbers = found["page"]
-        lines.append(
-            f"On the page a scripted browser took {numbers['seconds_per_placement']:.1f} s to place a device and "
-            f"{numbers['seconds_per_device']:.1f} s a device in all, drawings included."
-        )
-    lines.append(f"{os.cpu_count()} cores, load average {found['load']:.1f} at the end.")
-    return markdown(["path", "step", "command", "wall [s]", "CPU [s]"], rows) + "\n" + " ".join(lines) + "\n"
+        text += person(found["page"]["steps"]) + "\n"
+    return text + " ".join(lines) + "\n"
+
+
+def person(steps: Sequence[dict[str, Any]]) -> str:
+    """Lay out what the person did and waited for on the page."""
+    rows, whole = [], {"clicks": 0, "fields": 0, "waited": 0.0, "computed": 0.0}
+    for step in steps:
+        rows.append([step["name"], *_counts(step)])
+        whole = {key: whole[key] + step[key] for key in whole}
+    rows.append(["**all**", *(f"**{cell}**" for cell in _counts(whole))])
+    acted, times = f"at {HUMAN:g} s each [min]", ["waiting [min]", "together [min]", "CPU of the server [min]"]
+    head = ["on the page", "clicks", "fields", acted, *times]
+    return markdown(head, rows)
+
+
+def _counts(step: dict[str, Any]) -> list[str]:
+    acted, waited = HUMAN * (step["clicks"] + step["fields"]) / 60.0, step["waited"] / 60.0
+    counts = [f"{step['clicks']}", f"{step['fields']}"]
+    return counts + [f"{minutes:.1f}" for minutes in (acted, waited, acted + waited, step["computed"] / 60.0)]
 
 
 def short(command: str) -> str:
@@ -194,21 +223,30 @@ def main() -> None:
     parser.add_argument("--small", action="store_true", help="an office of 12 zones in place of the pilot")
     parser.add_argument("--without-visit", action="store_true", help="no clone, install and demo: this environment")
     parser.add_argument("--without-browser", action="store_true", help="no page, even where node and chromium are")
+    parser.add_argument("--pictures", type=Path, help="folder of pictures of what the person sees")
     parser.add_argument("--publish", action="store_true", help="replace the table between its marks")
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="newcomer-") as folder:
-        found = walk(Path(folder), SMALL if asked.small else PILOT, asked.without_visit, asked.without_browser)
+        size = SMALL if asked.small else PILOT
+        found = walk(Path(folder), size, asked.without_visit, asked.without_browser, pictures=asked.pictures)
     write(asked.out, NAME, found.pop("table"), found, asked.publish)
 
 
-def walk(home: Path, size: Size, without_visit: bool, without_browser: bool, run: Run = execute) -> dict[str, Any]:
+def walk(
+    home: Path,
+    size: Size,
+    without_visit: bool,
+    without_browser: bool,
+    run: Run = execute,
+    pictures: Path | None = None,
+) -> dict[str, Any]:
     """Walk both paths in a folder."""
     path, tool = Walk(run), [sys.executable, "-m", "mpc.cli"]
     if not without_visit:
         tool = [str(visit(path, home) / ".venv" / "bin" / "buildingmpc")]
     standing = raise_building(home, size)
     browser = not without_browser and browser_programs() is not None
-    found = own_building(path, home, tool, standing, browser)
+    found = own_building(path, home, tool, standing, browser, pictures)
     found |= {"zones": standing.zones, "devices": standing.devices, "days": size.days, "load": os.getloadavg()[0]}
     return found | {"steps": [asdict(step) for step in path.steps], "table": report(path.steps, found)}
 

@@ -18,6 +18,7 @@ from calibration.fleet.job import Job, Status
 from calibration.fleet.settings import Settings
 from calibration.results import Plain, write_results
 from thermal.case.load import NAME, load_case, read_building_file
+from thermal.case.validation import has_windows
 from thermal.errors import CaseError, ThermalError
 
 #: File in the results of each case: what they were made from, and how it went.
@@ -54,6 +55,8 @@ class CaseOutcome(Plain):
         Name and text of what went wrong.
     bad_input : bool
         Whether that is for the user to mend in the case or the settings, rather than a failure.
+    has_windows : bool, optional
+        Whether the building has glazing at all; None without results.
     """
 
     case: str
@@ -69,6 +72,7 @@ class CaseOutcome(Plain):
     error: str | None = None
     message: str | None = None
     bad_input: bool = False
+    has_windows: bool | None = None
     key: ClassVar[str] = "case"
 
 
@@ -192,7 +196,7 @@ def _do_one(task: CaseTask) -> CaseOutcome:
     seconds, attempts = time.perf_counter() - began, len(task.starts())
     outcome = CaseOutcome(
         task.name, done.status, done.before, done.after, seconds, attempts=attempts, solver=done.solver,
-        verdict=done.verdict, effects=done.effects,
+        verdict=done.verdict, effects=done.effects, has_windows=has_windows(case.building),
     )  # fmt: skip
     record = {
         "settings": task.job.spell(task.settings),

@@ -15,6 +15,7 @@ from calibration.errors import CalibrationError
 from mpc import plugins
 from mpc.cli import options
 from mpc.cli.console import Progress, Waiting, answer, complain, say, show_table
+from thermal.case.validation import NO_WINDOWS
 
 if TYPE_CHECKING:
     from calibration.diagnosis.diagnosis import Diagnosis
@@ -208,6 +209,9 @@ def _many(
         elif outcome.solver is not None and outcome.status == "not_converged":
             name, status = outcome.solver["name"], outcome.solver["status"]
             complain(f"error: {outcome.case}: {name} did not converge: {status}; the results say so too")
+    if blind := [outcome.case for outcome in outcomes if outcome.has_windows is False]:
+        told = NO_WINDOWS.replace("the building has", f"{len(blind)} of {len(outcomes)} buildings have", 1)
+        complain(f"warning: {', '.join(blind)}: {told}")
     content = {"cases": {outcome.case: outcome.to_dict() for outcome in outcomes}}
     answer(json, content, lambda: _show_outcomes(what, outcomes, settings["horizon"], out))
     if all(outcome.status in ("calibrated", "diagnosed") for outcome in outcomes):
@@ -218,7 +222,8 @@ def _many(
 def _show_outcomes(what: str, outcomes: Sequence[CaseOutcome], horizon: str, out: Path) -> None:
     rows: list[tuple[Any, ...]] = []
     for o in outcomes:
-        status = o.error or o.status.replace("_", " ") + (", done before" if o.resumed else "")
+        remarks = (", done before" if o.resumed else "") + (", no windows" if o.has_windows is False else "")
+        status = o.error or o.status.replace("_", " ") + remarks
         found = () if what == "calibrate" else ((o.verdict or "").replace("_", " "), ", ".join(o.effects))
         rows.append((o.case, o.held_out_mae_before, o.held_out_mae_after, *found, o.seconds, status))
     errors = {"before [K]": ".3f", "after [K]": ".3f"}

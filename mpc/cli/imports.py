@@ -121,13 +121,14 @@ def import_telemetry(
     from mpc.reports.page import counted
     from thermal.case.case import Case
     from thermal.case.load import load_building
+    from thermal.intake.stamps import checked_zone
     from thermal.intake.telemetry import ImportSettings
     from thermal.intake.telemetry import import_telemetry as read
     from thermal.plan.folder import save_with_labels
     from thermal.plan.match import read_matches, write_matches
 
     building = load_building(case)
-    settings = ImportSettings(table, _zone(tz), _seconds(resample), _units(unit or ()))
+    settings = ImportSettings(table, checked_zone(tz, "--tz"), _seconds(resample), _units(unit or ()))
     found = read(building, source, settings, read_matches(points) if points is not None else None)
     new = Case(building, found.telemetry)
     folder = save_with_labels(new, case.parent if case.is_file() else case, out, overwrite=force)
@@ -152,17 +153,6 @@ def import_telemetry(
     content |= {"columns": frame.shape[1], "points": [asdict(m) for m in found.matches]}
     content |= {"remarks": list(found.remarks), "unmatched_heat": list(found.unmatched_heat)}
     return answer(json, content, show)
-
-
-def _zone(name: str) -> str:
-    """Check the name of a time zone; empty stays empty."""
-    from zoneinfo import available_timezones
-
-    from thermal.errors import PlanError
-
-    if name:
-        PlanError.unless_known(name, available_timezones(), "--tz", "an IANA name")
-    return name
 
 
 def _seconds(text: str) -> float | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import signal
 import webbrowser
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
@@ -110,6 +111,9 @@ def _covered(case: BoptestCase) -> str:
     return "a typical year" if case.weather.typical else f"{first:%Y-%m-%d %H:%M} to {last:%Y-%m-%d %H:%M}"
 
 
+#: How long a report that is stopped may take to clear away what it was writing [s].
+_PATIENCE = 10.0
+
 _MAKERS: dict[str, Callable[[Path, Path, bool, Progress], Any]] = {
     "check": run_check, "calibrate": run_calibration, "diagnose": run_diagnosis,
 }  # fmt: skip
@@ -204,13 +208,23 @@ def _make_apart(kind: str, case: Path, out: Path, progress: Progress) -> None:
     finally:
         if process.is_alive():
             process.terminate()
+        process.join(_PATIENCE)
+        if process.is_alive():  # in the middle of a solve, which hears no signal
+            process.kill()
         process.join()
     if process.exitcode:
         raise MpcError(f"the process that makes the report ended with code {process.exitcode}")
 
 
+def _leave(number: int, frame: object) -> None:
+    """End as on Ctrl-C, so that what was being written is taken away."""
+    raise SystemExit(128 + number)
+
+
 def _make(kind: str, case: Path, out: Path, connection: Connection[Any, Any], named: Sequence[str]) -> None:
     """Make a report; what goes wrong is told in a sentence."""
+    signal.signal(signal.SIGTERM, _leave)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the page's: it ends this process by the other signal
     try:
         plugins.load_plugins(named)
         _MAKERS[kind](case, out, True, lambda *told: connection.send(told))

@@ -17,7 +17,16 @@ from mpc.reports.figures.errors import error_band, error_growth, median_run
 from mpc.reports.figures.field import spatial_field
 from mpc.reports.identifiability import information_content, information_sentences
 from mpc.reports.means import calibration_means, determined_words
-from mpc.reports.page import counted, duration, estimated_sentences, in_words, kelvin, percent, render
+from mpc.reports.page import (
+    case_warnings,
+    counted,
+    duration,
+    estimated_sentences,
+    in_words,
+    kelvin,
+    percent,
+    render,
+)
 from mpc.reports.residuals import diagnostics_content
 from thermal.case.case import Case
 from thermal.model.case_replay import Inputs, replay_inputs
@@ -219,6 +228,7 @@ def _content(result: CalibrationResult, case: Case, grid: SymbolicModel, inputs:
         "verdict": calibration_verdict(result),
         "means": calibration_means(result, evaluation.unchanged_error(after)),
         "determined": determined_words([p for p in result.parameters if p.standard_error is not None]),
+        "warnings": case_warnings(case),
         "fine": result.solver.success and after.metrics.mae < before.metrics.mae,
         "parts": [(title, result.uncalibrated[k].metrics, result.calibrated[k].metrics,
                    evaluation.unchanged_error(result.calibrated[k])) for title, k in parts.items()],

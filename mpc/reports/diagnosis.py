@@ -23,7 +23,7 @@ from mpc.reports.figures.errors import series_of_runs
 from mpc.reports.figures.plan import heat_maps
 from mpc.reports.figures.style import CELSIUS, Picture
 from mpc.reports.means_found import diagnosis_means
-from mpc.reports.page import kelvin, listed, render, significant, sure, unit
+from mpc.reports.page import case_warnings, kelvin, listed, render, significant, sure, unit
 from thermal.case.building import FloorPlans
 from thermal.case.case import Case
 from thermal.effects.catalogue import CATALOGUE
@@ -161,6 +161,7 @@ def _content(result: Diagnosis, case: Case, replayed: Sequence[Replay]) -> dict[
         "subtitle": subtitle(case, evaluations[0]),
         "verdict": diagnosis_words.diagnosis_verdict(result),
         "means": diagnosis_means(result),
+        "warnings": case_warnings(case),
         "fine": result.verdict.name != "unexplained",
         "found": found,
         "ahead": diagnosis_words.ahead(result),

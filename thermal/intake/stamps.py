@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from zoneinfo import ZoneInfo
+from zoneinfo import ZoneInfo, available_timezones
 
 import numpy as np
 import pandas as pd
@@ -61,6 +61,31 @@ class ClockReport:
                 f"{self.skipped} values of an hour that {timezone} does not have (first {self.first_skipped}) were "
                 "left out: the logger does not seem to change its clock; give a --tz without daylight-saving time"
             )
+
+
+def checked_zone(name: str, where: str) -> str:
+    """Refuse what is no time zone; empty stays empty.
+
+    Parameters
+    ----------
+    name
+        IANA name.
+    where
+        What gave it, for messages.
+
+    Returns
+    -------
+    str
+        The same.
+
+    Raises
+    ------
+    PlanError
+        There is no time zone of that name.
+    """
+    if name:
+        PlanError.unless_known(name, available_timezones(), where, "an IANA name")
+    return name
 
 
 def parse_stamps(cells: pd.Series, where: str) -> pd.Series:

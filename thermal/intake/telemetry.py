@@ -15,6 +15,7 @@ from thermal.errors import CaseError, PlanError
 from thermal.intake.resample import counter_means, step_means, usual_interval
 from thermal.intake.series import RawSeries, read_series, split_unit
 from thermal.intake.source import shown
+from thermal.intake.stamps import ClockReport
 from thermal.plan.devices import words_of
 from thermal.plan.guard import vocabulary
 from thermal.plan.match import PointMatch, match_points
@@ -107,24 +108,69 @@ def import_telemetry(
     Raises
     ------
     PlanError
-        The table cannot be read, lacks a column of `matches`, or no column is matched.
+        The table cannot be read, lacks a column of `matches`, no column is matched, or two are for the same point.
     CaseError
         A unit does not measure its point, an entity is none of the building's, or the steps are out of range.
     """
     given = settings or ImportSettings()
     series, clock = read_series(source, given.table, given.timezone)
     listed = tuple(matches) if matches is not None else match_series(building, series)
-    used = {match.column: match for match in listed if match.point and not match.remark}
+    return telemetry_of_series(building, series, clock, given, listed, shown(source))
+
+
+def telemetry_of_series(
+    building: Building,
+    series: Mapping[str, RawSeries],
+    clock: ClockReport,
+    settings: ImportSettings,
+    matches: Sequence[PointMatch],
+    where: str,
+) -> TelemetryImport:
+    """Make telemetry of a building from the columns of a table that is read already.
+
+    Parameters
+    ----------
+    building : Building
+        Whose zones and devices the columns are of.
+    series : mapping of str to RawSeries
+        By name of the column.
+    clock : ClockReport
+        What became of their stamps.
+    settings : ImportSettings
+        How the table was read, and the steps that are wanted.
+    matches : sequence of PointMatch
+        What columns are.
+    where : str
+        The table, for messages.
+
+    Returns
+    -------
+    TelemetryImport
+        Telemetry, and all that was done.
+
+    Raises
+    ------
+    PlanError
+        A column of `matches` is not there, none is matched, or two are for the same point.
+    CaseError
+        A unit does not measure its point, an entity is none of the building's, or the steps are out of range.
+    """
+    used = {match.column: match for match in matches if match.point and not match.remark}
     if not used:
-        raise PlanError(shown(source), "a column that is matched to a point", "none", "see points.csv")
+        raise PlanError(where, "a column that is matched to a point", "none", "see points.csv")
     if lacking := sorted(used.keys() - series.keys()):
         found = f"no {lacking[0]!r}" + (f" and {len(lacking) - 1} more" if len(lacking) > 1 else "")
-        raise PlanError(shown(source), "the columns of the list of points", found)
-    units = {column: _unit(match, series[column], given.units) for column, match in used.items()}
+        raise PlanError(where, "the columns of the list of points", found)
+    owners: dict[str, str] = {}
+    for match in used.values():
+        first = owners.setdefault(f"{match.entity}/{match.point}", match.column)
+        found, advice = f"{first!r} and {match.column!r}", "leave one of them out"
+        PlanError.unless(first == match.column, f"{match.entity}/{match.point}", "one column", found, advice)
+    units = {column: _unit(match, series[column], settings.units) for column, match in used.items()}
     check_columns(building, [f"{m.entity}/{m.point}" for m in used.values()], "points", check_boundaries=False)
-    remarks = [*clock.sentences(given.timezone)]
+    remarks = [*clock.sentences(settings.timezone)]
     clean = {column: _in_order(series[column], units[column], remarks) for column in used}
-    ends, step = _grid(clean, given.step, building.location.timezone, remarks)
+    ends, step = _grid(clean, settings.step, building.location.timezone, remarks)
     columns = {}
     for column, match in used.items():
         values = _on_steps(clean[column], units[column], match.point, ends, step, building.location.elevation, remarks)
@@ -135,8 +181,8 @@ def import_telemetry(
     aside = [pd.DataFrame({INDEX: s.values.index, "column": s.name, "value": s.values.to_numpy()}) for s in
              (series[name] for name in left)]  # fmt: skip
     empty = pd.DataFrame({INDEX: ends[:0], "column": [], "value": []})
-    telemetry = Telemetry.from_frame(frame, where=shown(source))
-    return TelemetryImport(telemetry, listed, tuple(remarks), heat, pd.concat(aside) if aside else empty)
+    telemetry = Telemetry.from_frame(frame, where=where)
+    return TelemetryImport(telemetry, tuple(matches), tuple(remarks), heat, pd.concat(aside) if aside else empty)
 
 
 def match_series(building: Building, series: Mapping[str, RawSeries]) -> tuple[PointMatch, ...]:

@@ -8,10 +8,11 @@ from scipy.signal import fftconvolve
 
 from thermal._types import FloatArray
 from thermal.case.building import FloorPlan, FloorPlans
-from thermal.case.plan import check_plan, zone_floor_areas
+from thermal.case.plan import check_plan, facade_areas, zone_floor_areas
 from thermal.errors import LostRoomError, PlanError
-from thermal.plan.cells import ZonedFloor, draw_cells
+from thermal.plan.cells import ZonedFloor, distinct_names, draw_cells
 from thermal.plan.guard import checked_number
+from thermal.plan.windows import clipped_glazing
 
 _GRID = 0.1  # m, on which outlines are compared
 _LEAST_OVERLAP = 0.6  # -, of the smaller floor; below it outlines say nothing
@@ -185,8 +186,9 @@ def assemble_plans(
     -----
     The grid's corner is chosen too, among 16, for the smallest largest error.
     """
-    _check_names(floors)
-    placed = align_floors(floors, anchors)
+    named = distinct_names(floors)
+    _check_names(named)
+    placed = align_floors(named, anchors)
     sizes = CELL_SIZES if cell_size is None else (checked_number(cell_size, "cell_size", 0.02, 5.0, "m"),)
     best: tuple[float, PlanImport] | None = None
     lost: LostRoomError | None = None
@@ -215,7 +217,9 @@ def assemble_plans(
         raise lost or LostRoomError("no cell size fits")
     for plan in best[1].plans.floors:
         check_plan(plan.tokens, f"floor {plan.name!r}")
-    return best[1]
+    shown = {zone: sides for floor in placed for zone, sides in floor.glazing.items()}
+    glazing = clipped_glazing(shown, facade_areas(best[1].plans)) if shown else {}
+    return replace(best[1], plans=replace(best[1].plans, glazing=glazing))
 
 
 def _area_errors(floors: Sequence[ZonedFloor], plans: Sequence[FloorPlan], cell_size: float) -> dict[str, float]:

@@ -4,8 +4,8 @@ The plan's walls run along the middle of the drawing's interior walls and along 
 as a ``+`` cell counts half to each side and a ``#`` cell to nobody.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from thermal.case.validation import RESERVED
 from thermal.errors import LostRoomError, PlanError
 from thermal.plan.guard import checked_number
 from thermal.plan.survey import OUTSIDE_LABEL, WALL_LABEL, FloorSurvey
+from thermal.plan.windows import WINDOW_HEIGHT
 
 _SAMPLES = 5  # points a cell's side at which the drawing is looked at
 
@@ -40,6 +41,8 @@ class ZonedFloor:
         Names of the zones, in the order of their numbers.
     offset : tuple of float
         Rightwards and downwards, from the common origin of the floors to the survey's first corner [m].
+    glazing : mapping
+        Area of the windows that the drawing shows, by zone and facade [m2].
     """
 
     name: str
@@ -48,6 +51,7 @@ class ZonedFloor:
     zones: Int32Array
     names: tuple[str, ...]
     offset: tuple[float, float] = (0.0, 0.0)
+    glazing: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     @property
     def areas(self) -> dict[str, float]:
@@ -207,6 +211,7 @@ def propose_zones(
     *,
     names: Mapping[str, tuple[float, float]] | None = None,
     smallest_zone: float = 4.0,
+    window_height: float = WINDOW_HEIGHT,
 ) -> ZonedFloor:
     """Propose the zones of a floor: its rooms, with those that are too small for one joined to the room next to them.
 
@@ -223,6 +228,8 @@ def propose_zones(
         drawing (texts of a DXF), or ``<floor>_R01`` and so on, row by row.
     smallest_zone : float
         Smaller rooms without a name [m2] join the one behind their widest door, or else along their longest wall.
+    window_height : float
+        Of windows that the drawing shows [m], 0 to 30; no more than `height` counts.
 
     Returns
     -------
@@ -260,7 +267,54 @@ def propose_zones(
         small = "1 room" if joined == 1 else f"{joined} rooms"
         remark = f"{small} under {smallest_zone:g} m2 joined the zone behind the door, or beside where there is none"
         survey = replace(survey, remarks=(*survey.remarks, remark))
-    return ZonedFloor(floor, float(height), survey, number[rooms], tuple(titles))
+    numbers = number[rooms]
+    checked_number(window_height, "window_height", 0.0, 30.0, "m")
+    glazing = _glazing(survey, numbers, titles, min(window_height, height))
+    if glazing:
+        width = sum(window.width for window in survey.windows)
+        remark = f"{width:.1f} m of windows are drawn, taken as {min(window_height, height):g} m high"
+        survey = replace(survey, remarks=(*survey.remarks, remark))
+    return ZonedFloor(floor, float(height), survey, numbers, tuple(titles), glazing=glazing)
+
+
+def _glazing(
+    survey: FloorSurvey, zones: Int32Array, names: Sequence[str], height: float
+) -> dict[str, dict[str, float]]:
+    """Area of the windows that a drawing shows, by zone and facade [m2]."""
+    found: dict[str, dict[str, float]] = {}
+    for window in survey.windows:
+        zone = int(zones[round(window.room[1]), round(window.room[0])])
+        if zone > 0:
+            sides = found.setdefault(names[zone - 1], {})
+            sides[window.facade] = sides.get(window.facade, 0.0) + window.width * height
+    return found
+
+
+def distinct_names(floors: Sequence[ZonedFloor], taken: Collection[str] = ()) -> tuple[ZonedFloor, ...]:
+    """Tell apart rooms of several floors to which their drawings give the same name, as each has its kitchen.
+
+    Parameters
+    ----------
+    floors : sequence of ZonedFloor
+        Of a building.
+    taken : collection of str
+        Names of zones that are there already.
+
+    Returns
+    -------
+    tuple of ZonedFloor
+        With the floor's name before such names; names that a person gave stay, and are refused where they collide.
+    """
+    listed = [*taken, *(name for floor in floors for name in floor.names)]
+    again = {name for name in listed if listed.count(name) > 1}
+    changed = []
+    for floor in floors:
+        drawn = {room.name for room in floor.survey.rooms if room.name} & again
+        new = {name: f"{floor.name} {name}" for name in drawn if f"{floor.name} {name}" not in listed}
+        names = tuple(new.get(name, name) for name in floor.names)
+        glazing = {new.get(zone, zone): sides for zone, sides in floor.glazing.items()}
+        changed.append(replace(floor, names=names, glazing=glazing))
+    return tuple(changed)
 
 
 def _given_names(survey: FloorSurvey, floor: str, names: Mapping[str, tuple[float, float]]) -> dict[int, str]:

@@ -2,7 +2,6 @@
 
 import math
 import re
-import subprocess
 import tempfile
 import warnings
 from dataclasses import dataclass
@@ -15,8 +14,8 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from thermal.case.building import Entry
-from thermal.errors import MissingExtraError, OversizedFileError, PlanError
-from thermal.plan.guard import check_pixels, checked_file, checked_number, extra
+from thermal.errors import OversizedFileError, PlanError
+from thermal.plan.guard import check_pixels, checked_file, checked_number, extra, run_program
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Point = tuple[Finite, Finite]
@@ -141,7 +140,6 @@ RASTER_KINDS = (".png", ".jpg", ".jpeg", ".pdf")
 
 #: Resolution at which pages of a PDF are drawn unless told otherwise [dots per inch]: 1 px is 1.7 cm at 1:100.
 DOTS_PER_INCH = 150.0
-_PATIENCE = 60.0  # s, for a page of a PDF; an honest one takes a second or two
 
 
 @dataclass(frozen=True, eq=False)
@@ -256,19 +254,7 @@ def _pdf_page(file: Path, page: int, dpi: float) -> NDArray[np.uint8]:
 
 
 def _poppler(command: list[str], file: Path) -> str:
-    """Run one of poppler's programs, for a limited time."""
-    try:
-        done = subprocess.run(command, capture_output=True, timeout=_PATIENCE, check=False)
-    except FileNotFoundError as error:
-        advice = "run: apt install poppler-utils"
-        raise MissingExtraError("plan import", f"the program {command[0]!r}", "none", advice) from error
-    except subprocess.TimeoutExpired as error:
-        expected = f"a page that is drawn within {_PATIENCE:.0f} s"
-        raise OversizedFileError(file.name, expected, "one that takes longer", "export it anew") from error
-    if done.returncode != 0:
-        found = " ".join(done.stderr.decode(errors="replace").replace(str(file), file.name).split())[:200]
-        raise PlanError(file.name, "a whole PDF file with that page", found or "an error")
-    return done.stdout.decode(errors="replace")
+    return run_program(command, file, "a whole PDF file with that page", "poppler-utils")
 
 
 def _checked_crop(crop: tuple[int, int, int, int], shape: tuple[int, ...]) -> tuple[int, int, int, int]:

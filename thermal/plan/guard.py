@@ -2,6 +2,7 @@
 
 import importlib
 import math
+import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -116,8 +117,53 @@ def checked_file(path: Path, kinds: tuple[str, ...]) -> Path:
     # A PDF may have some bytes before its signature (ISO 32000-1, annex H, note 13).
     fits = known is None or (known[0] in start if suffix == ".pdf" else start.startswith(known))
     found = f"a file that begins with {start[:8]!r}" if start else "an empty file"
-    PlanError.unless(fits and start, path.name, f"a {suffix[1:].upper()} file", found, "export the drawing anew")
+    PlanError.unless(fits and start, path.name, f"a {suffix[1:].upper()} file", found, "export it anew")
     return path.absolute()
+
+
+_PATIENCE = 60.0  # s, for a page of a drawing; an honest one takes a second or two, its words ten
+
+
+def run_program(command: list[str], file: Path, expected: str, package: str) -> str:
+    """Run a program on a drawing, for a limited time.
+
+    Parameters
+    ----------
+    command : list of str
+        Program and arguments.
+    file : Path
+        The drawing, for messages.
+    expected : str
+        What it should be, for messages.
+    package : str
+        Of Debian, that has the program.
+
+    Returns
+    -------
+    str
+        What it wrote.
+
+    Raises
+    ------
+    MissingExtraError
+        The program is not installed.
+    OversizedFileError
+        It takes longer than a minute.
+    PlanError
+        It fails.
+    """
+    try:
+        done = subprocess.run(command, capture_output=True, timeout=_PATIENCE, check=False)
+    except FileNotFoundError as error:
+        advice = f"run: apt install {package}"
+        raise MissingExtraError("plan import", f"the program {command[0]!r}", "none", advice) from error
+    except subprocess.TimeoutExpired as error:
+        wanted = f"a page that is drawn within {_PATIENCE:.0f} s"
+        raise OversizedFileError(file.name, wanted, "one that takes longer", "export it anew") from error
+    if done.returncode != 0:
+        found = " ".join(done.stderr.decode(errors="replace").replace(str(file), file.name).split())[:200]
+        raise PlanError(file.name, expected, found or "an error")
+    return done.stdout.decode(errors="replace")
 
 
 @contextmanager

@@ -17,6 +17,8 @@ from thermal.plan.guard import checked_file, first_fault, inside_folder, reading
 from thermal.plan.rooms import find_rooms
 from thermal.plan.survey import CODE_KINDS, FloorSurvey, PlanSettings, read_codes
 from thermal.plan.vector import VECTOR_KINDS, read_dxf
+from thermal.plan.windows import WINDOW_HEIGHT
+from thermal.plan.words import TextLine, name_rooms, pdf_lines, picture_lines
 
 _MOST_YAML = 1_000_000  # bytes: a list of a hundred floors with the names of all rooms has a tenth of that
 
@@ -56,6 +58,10 @@ class FloorEntry(Entry):
         As in `PlanSettings` [m].
     smallest_room, smallest_zone
         As in `PlanSettings` [m2].
+    read_text
+        Whether texts in rooms become their names. Default: of a DXF and a PDF; true: of a picture, too, by OCR.
+    window_height
+        Of windows that a DXF shows [m].
     """
 
     name: Annotated[str, Field(min_length=1)]
@@ -77,6 +83,8 @@ class FloorEntry(Entry):
     thinnest_wall: Finite = PlanSettings.thinnest_wall
     smallest_room: Finite = PlanSettings.smallest_room
     smallest_zone: Finite = PlanSettings.smallest_zone
+    read_text: bool | None = None
+    window_height: Finite = WINDOW_HEIGHT
 
 
 class DrawingList(Entry):
@@ -192,7 +200,8 @@ def read_floor(entry: FloorEntry, folder: Path) -> ZonedFloor:
         One of its family, for the first thing that does not fit.
     """
     survey = _survey(entry, inside_folder(folder, entry.file, f"floors: {entry.name}: file"))
-    return propose_zones(survey, entry.name, entry.height, names=entry.names, smallest_zone=entry.smallest_zone)
+    numbers = {"smallest_zone": entry.smallest_zone, "window_height": entry.window_height}
+    return propose_zones(survey, entry.name, entry.height, names=entry.names, **numbers)
 
 
 def _survey(entry: FloorEntry, file: Path) -> FloorSurvey:
@@ -204,11 +213,18 @@ def _survey(entry: FloorEntry, file: Path) -> FloorSurvey:
         return read_codes(file, entry.cell_size)
     if kind in VECTOR_KINDS:
         layers = {"wall_layers": entry.wall_layers, "room_layers": entry.room_layers}
-        return read_dxf(file, unit=entry.unit, **layers, settings=settings, straighten=entry.straighten)
+        survey = read_dxf(file, unit=entry.unit, **layers, settings=settings, straighten=entry.straighten)
+        return name_rooms(survey, ()) if entry.read_text is False else survey
     if kind not in RASTER_KINDS:
         raise PlanError(file.name, f"a drawing: {', '.join((*RASTER_KINDS, *VECTOR_KINDS, *CODE_KINDS))}", repr(kind))
     drawing = read_drawing(file, page=entry.page, dots_per_inch=entry.dots_per_inch, crop=entry.crop)
     if entry.scale is None:
         advice = "give two points of the drawing and their distance"
         raise PlanError(f"{file.name}: scale", "the scale of the drawing", "none", advice)
-    return find_rooms(drawing, entry.scale.of(drawing), settings=settings, straighten=entry.straighten)
+    survey = find_rooms(drawing, entry.scale.of(drawing), settings=settings, straighten=entry.straighten)
+    lines: tuple[TextLine, ...] = ()
+    if kind == ".pdf" and entry.read_text is not False:
+        lines = pdf_lines(file.absolute(), entry.page, entry.dots_per_inch)
+    if entry.read_text and not lines:
+        lines = picture_lines(drawing)
+    return name_rooms(survey, lines)

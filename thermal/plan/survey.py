@@ -103,6 +103,25 @@ class Door:
     centre: tuple[float, float]
 
 
+@dataclass(frozen=True)
+class Window:
+    """Glass between a room and the outside.
+
+    Parameters
+    ----------
+    room : tuple of float
+        Column and row of a point in the room behind it [px of the survey].
+    facade : str
+        ``north`` is up on the plan.
+    width : float
+        [m].
+    """
+
+    room: tuple[float, float]
+    facade: str
+    width: float
+
+
 @dataclass(frozen=True, eq=False)
 class FloorSurvey:
     """One floor as it was understood from its drawing.
@@ -127,6 +146,8 @@ class FloorSurvey:
         What a look at the picture should confirm.
     ink : ndarray of bool or None, shape (n_row, n_col)
         What is drawn there, walls or not, for pictures.
+    windows : tuple of Window
+        Of a vector drawing that shows them.
     """
 
     source: str
@@ -138,6 +159,7 @@ class FloorSurvey:
     placement: FloatArray | None = None
     remarks: tuple[str, ...] = ()
     ink: BoolArray | None = None
+    windows: tuple[Window, ...] = ()
 
     def place(self, point: tuple[float, float]) -> tuple[float, float]:
         """Where a point of the drawing lies.

@@ -18,11 +18,14 @@ from thermal.plan.guard import check_pixels, checked_file, checked_number, extra
 from thermal.plan.ink import FINE, Ink
 from thermal.plan.rooms import survey_ink
 from thermal.plan.survey import FloorSurvey, PlanSettings, rooms_of
+from thermal.plan.windows import find_windows
+from thermal.plan.words import TextLine, name_rooms
 
 VECTOR_KINDS = (".dxf",)
 
 #: Names of layers, in the languages of many offices: English, German, French, Spanish, Italian, Dutch.
 WALL_LAYERS = r"wall|wand|w[aä]nde|mauer|\bmur|muro|parete|tabique|partition|a-glaz|window|fenster"
+WINDOW_NAMES = r"glaz|window|fenster|fen[eê]tre|ventana|finestra|\braam"  # of layers, and of blocks
 ROOM_LAYERS = r"room|raum|space|area|zone|pi[eè]ce|local|stanza"
 
 _MOST_ENTITIES = 400_000  # a floor of a hospital has some 50,000; blocks within blocks can hold any number
@@ -40,7 +43,8 @@ class _Content:
     lines: list[FloatArray]
     solids: list[FloatArray]
     rooms: list[FloatArray]
-    texts: list[tuple[str, float, float]]
+    texts: list[TextLine]
+    windows: list[FloatArray]
 
 
 def read_dxf(
@@ -73,7 +77,7 @@ def read_dxf(
     Returns
     -------
     FloorSurvey
-        What was understood, with texts in rooms as their names.
+        What was understood, with texts in rooms as their names, and windows where layers or blocks are called so.
 
     Raises
     ------
@@ -93,7 +97,12 @@ def read_dxf(
     angle, placement, shape = _upright(content, straighten, metres, file.name)
     settings = settings or PlanSettings()
     survey = _survey(content, placement, shape, angle, settings, file.name)
-    return _named(survey, content.texts, metres)
+    own = survey.placement if survey.placement is not None else np.eye(3)
+    if content.windows:
+        upright = [line @ own[:2, :2].T + own[:2, 2] for line in content.windows]
+        survey = replace(survey, windows=find_windows(upright, survey, settings.thickest_wall))
+    named = name_rooms(survey, content.texts)
+    return replace(named, placement=own @ np.diag([metres, metres, 1.0]))
 
 
 def _open(file: Path) -> Any:
@@ -118,11 +127,12 @@ def _collect(document: Any, metres: float, walls: str, rooms: str, where: str, w
         is_wall, is_room = re.compile(walls, re.IGNORECASE), re.compile(rooms, re.IGNORECASE)
     except re.error as error:
         raise PlanError(where, "a regular expression for layers", str(error)) from error
-    decompose = extra("ezdxf.disassemble").recursive_decompose
+    is_window = re.compile(WINDOW_NAMES, re.IGNORECASE)
     found: list[tuple[str, str, Any]] = []
-    texts: list[tuple[str, float, float]] = []
+    glass: list[tuple[str, Any]] = []
+    texts: list[TextLine] = []
     try:
-        for count, entity in enumerate(islice(decompose(document.modelspace()), _MOST_ENTITIES + 1)):
+        for count, (entity, parent) in enumerate(islice(_entities(document), _MOST_ENTITIES + 1)):
             if count == _MOST_ENTITIES:
                 expected = f"at most {_MOST_ENTITIES} lines and arcs"
                 raise OversizedFileError(where, expected, "more", "explode less, or export one floor")
@@ -130,6 +140,9 @@ def _collect(document: Any, metres: float, walls: str, rooms: str, where: str, w
             if kind in ("TEXT", "MTEXT"):
                 texts.append(_text(entity, metres))
             elif kind in ("LINE", "LWPOLYLINE", "POLYLINE", "ARC", "HATCH", "SOLID"):
+                if is_window.search(layer) or is_window.search(parent):  # a window closes its wall
+                    glass.append((kind, entity))
+                    layer = layer if is_wall.search(layer) or wanted is not None else "window"
                 found.append((kind, layer, entity))
     except RecursionError as error:
         raise OversizedFileError(where, "blocks that end", "blocks within blocks", "explode them") from error
@@ -143,7 +156,17 @@ def _collect(document: Any, metres: float, walls: str, rooms: str, where: str, w
     drawn = [(kind, line) for kind, _, entity in on_walls for line in _lines(entity, kind, metres) if len(line) > 1]
     lines, solids = ([line for kind, line in drawn if (kind in ("HATCH", "SOLID")) == solid] for solid in (False, True))
     closed = (line for kind, _, entity in outlines for line in _lines(entity, kind, metres) if len(line) > 3)
-    return _Content(lines, solids, [line for line in closed if np.allclose(line[0], line[-1])], texts)
+    windows = [line for kind, entity in glass for line in _lines(entity, kind, metres) if len(line) > 1]
+    return _Content(lines, solids, [line for line in closed if np.allclose(line[0], line[-1])], texts, windows)
+
+
+def _entities(document: Any) -> Iterator[tuple[Any, str]]:
+    """Entities of the model space, blocks taken apart, with name and layer of the block that they are from."""
+    decompose = extra("ezdxf.disassemble").recursive_decompose
+    for top in document.modelspace():
+        parent = f"{top.dxf.name} {top.dxf.layer}" if top.dxftype() == "INSERT" else ""
+        for entity in decompose([top]):
+            yield entity, parent
 
 
 def _lines(entity: Any, kind: str, metres: float) -> Iterator[FloatArray]:
@@ -159,12 +182,12 @@ def _lines(entity: Any, kind: str, metres: float) -> Iterator[FloatArray]:
             yield points
 
 
-def _text(entity: Any, metres: float) -> tuple[str, float, float]:
+def _text(entity: Any, metres: float) -> TextLine:
     words = entity.plain_text() if entity.dxftype() == "TEXT" else entity.plain_text(split=False)
     at = entity.dxf.insert
     if entity.dxftype() == "TEXT" and entity.dxf.hasattr("align_point"):
         at = entity.dxf.align_point
-    return " ".join(str(words).split())[:60], at.x * metres, at.y * metres
+    return TextLine(str(words), at.x * metres, at.y * metres)
 
 
 def _upright(
@@ -266,15 +289,3 @@ def _drawn(area: Any, placement: FloatArray, shape: tuple[int, int]) -> NDArray[
             filled[polygon(rows, columns, shape)] = number == 0
         mask |= filled
     return mask
-
-
-def _named(survey: FloorSurvey, texts: list[tuple[str, float, float]], metres: float) -> FloorSurvey:
-    """Give rooms the texts in them as names, the first one in each."""
-    names: dict[int, str] = {}
-    for words, x, y in texts:
-        label = survey.label_at((x, y))
-        if label > 0 and words:
-            names.setdefault(label, words)
-    rooms = tuple(replace(room, name=names.get(room.label, "")) for room in survey.rooms)
-    placement = survey.placement if survey.placement is not None else np.eye(3)
-    return replace(survey, rooms=rooms, placement=placement @ np.diag([metres, metres, 1.0]))

@@ -323,12 +323,16 @@ def test_odd_cases_make_whole_pages(tmp_path: Path, zones: int) -> None:
     assert ("of 39 zones with the largest error" in page.text) == (zones == 40)
 
 
-def test_many_parameters_are_folded_by_kind(result: CalibrationResult, tmp_path: Path) -> None:
+def test_many_parameters_are_folded_by_kind_and_a_warning_is_at_the_top(
+    result: CalibrationResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("mpc.reports.calibration.case_warnings", lambda case: ["The building has no windows."])
     first = result.parameters[0]
     many = tuple(replace(first, name=f"{kind}@Z{k}") for kind in ("air_film", "gain") for k in range(30))
     page = Page(write_calibration(replace(result, parameters=many), load_bundled_case(), tmp_path / "many"))
     assert "air film: 30 values" in page.text and "gain of Z29" in page.text
     assert "Drawn are 40 of 60" in page.text
+    assert '<p class="warning" role="alert">The building has no windows.</p>' in page.html
 
 
 def test_a_sentence_says_what_was_estimated() -> None:

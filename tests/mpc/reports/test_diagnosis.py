@@ -179,8 +179,10 @@ def test_growth_of_the_error_is_told_before_and_after(written: Path) -> None:
     assert "How the error grows" in page and "Left to itself" in page and "found it" in page
 
 
-def test_a_diagnosis_without_effects_is_written_too(tmp_path: Path) -> None:
+def test_a_diagnosis_without_effects_is_written_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("mpc.reports.diagnosis.case_warnings", lambda case: ["The building has no windows."])
     report = write_diagnosis(nothing_found(), load_bundled_case(), tmp_path / "none")
+    assert '<p class="warning" role="alert">The building has no windows.</p>' in report.read_text(encoding="utf-8")
     assert "in the model</span>" not in report.read_text(encoding="utf-8")
     assert json.loads((tmp_path / "none" / "calibration.json").read_text(encoding="utf-8"))["effects"] == []
     assert "with_effects" not in pd.read_parquet(tmp_path / "none" / "predictions.parquet")

@@ -1,6 +1,7 @@
 """Desk of the labelling page: the draft of one case, its jobs, sessions and reports."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from threading import RLock
@@ -10,10 +11,13 @@ from thermal.errors import SessionHeldError
 from thermal.plan.guard import inside_folder, reading
 from thermal.plan.list import read_drawing_list
 from thermal.plan.page.draft import Draft, Site, parse_draft
-from thermal.plan.page.drawings import DRAWING_KINDS, Progress, add_floors, checked_name, look_at
+from thermal.plan.page.drawings import DRAWING_KINDS, add_floors, checked_name, look_at
 from thermal.plan.page.findings import zone_facts
-from thermal.plan.page.reports import Jobs, ReportMaker, Reports
-from thermal.plan.page.store import CaseStore, Sessions, write_whole
+from thermal.plan.page.jobs import Jobs, Progress
+from thermal.plan.page.reports import ReportMaker, Reports
+from thermal.plan.page.sessions import Sessions
+from thermal.plan.page.store import CaseStore, write_whole
+from thermal.plan.page.telemetry import TelemetryDesk
 
 
 class LabelDesk:
@@ -48,6 +52,7 @@ class LabelDesk:
     ) -> None:
         self.store = CaseStore(case)
         self.sessions = Sessions(self.store.own, take_over=take_over)
+        self.telemetry = TelemetryDesk(self.store)
         self.jobs = Jobs()
         self.reports = Reports(self.store.folder, reports, makers or {})
         self._lock = RLock()
@@ -59,13 +64,15 @@ class LabelDesk:
         Returns
         -------
         dict
-            Draft, findings, areas, reports that can be made; which window saved last, and the revision from which on
-            it was the only one. A page that was loaded anew tells by them whether what it kept is later.
+            Draft, findings, areas, reports that can be made, jobs that are not done; which window saved last, and the
+            revision from which on it was the only one. A page that was loaded anew tells by them whether what it kept
+            is later.
         """
         with self._lock:
             draft = self.store.draft
             saver = {"saved_by": self._saver, "saved_since": self._since}
-            shown = {"draft": draft.model_dump(by_alias=True), "reports": self.reports.kinds}
+            shown: dict[str, Any] = {"draft": draft.model_dump(by_alias=True), "reports": self.reports.kinds}
+            shown |= {"running": self.jobs.unfinished()}
             return {**shown, **saver, **self._verdict(draft)}
 
     def save(self, window: str, content: Any) -> dict[str, Any]:
@@ -102,6 +109,37 @@ class LabelDesk:
             written = self.store.save(saved)
             return {"revision": saved.revision, "written": written, **self._verdict(saved)}
 
+    def take_telemetry(self, window: str, progress: Progress) -> dict[str, Any]:
+        """Put the table that was read into the case, unless another window has taken it meanwhile.
+
+        Parameters
+        ----------
+        window : str
+            Who asked for it.
+        progress : callable
+            Told stage, steps done and all steps.
+
+        Returns
+        -------
+        dict
+            What the check of the case finds.
+
+        Raises
+        ------
+        SessionHeldError
+            Another window has the case.
+        ThermalError
+            One of its family, as `TelemetryDesk.take` raises them.
+        """
+
+        @contextmanager
+        def guard() -> Iterator[None]:
+            with self._lock:
+                self.sessions.check(window)
+                yield
+
+        return self.telemetry.take(progress, guard)
+
     def end(self) -> None:
         """Stop what is being done, and give the case back."""
         self.jobs.end()
@@ -109,8 +147,7 @@ class LabelDesk:
 
     def _verdict(self, draft: Draft) -> dict[str, Any]:
         findings = [asdict(finding) for finding in self.store.findings]
-        # A case that the page has made has one column without a value, to be replaced.
-        telemetry = self.store.telemetry if len(self.store.columns) > 1 else ""
+        telemetry = self.store.telemetry if self.store.has_telemetry else ""
         return {"findings": findings, "zones": zone_facts(draft), "telemetry": telemetry}
 
 
@@ -168,6 +205,7 @@ def import_list(desk: LabelDesk, path: Path, progress: Progress) -> None:
         "orientation": round((turned + 180.0) % 360.0 - 180.0, 2),
         "cell_size": found.cell_size,
         "floors": found.floors,
+        "glazing": found.glazing,
     }
     desk.store.save(desk.store.draft.model_copy(update=changes))
 

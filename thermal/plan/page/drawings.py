@@ -1,8 +1,8 @@
 """Uploaded drawings, and the floors that are read from them."""
 
 import tempfile
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -10,18 +10,22 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal.case.building import OUTSIDE, PLAN_TOKENS
+from thermal.case.building import OUTSIDE, PLAN_TOKENS, FloorPlans
+from thermal.case.plan import facade_areas
 from thermal.errors import OversizedFileError, PlanError
 from thermal.plan.assemble import align_floors, assemble_plans
-from thermal.plan.cells import ZonedFloor, draw_cells
+from thermal.plan.cells import ZonedFloor, distinct_names, draw_cells
 from thermal.plan.drawing import RASTER_KINDS, read_drawing
 from thermal.plan.folder import png_of
 from thermal.plan.guard import MOST_BYTES, checked_file, inside_folder
 from thermal.plan.list import FloorEntry, read_floor
-from thermal.plan.page.draft import Draft, DraftFloor, Picture, encode_floor
+from thermal.plan.page.draft import Draft, DraftFloor, Picture, encode_floor, zones_of
+from thermal.plan.page.jobs import Progress
 from thermal.plan.page.store import write_whole
 from thermal.plan.survey import CODE_KINDS, OUTSIDE_LABEL, WALL_LABEL, FloorSurvey, read_codes
 from thermal.plan.vector import VECTOR_KINDS
+from thermal.plan.windows import clipped_glazing
+from thermal.plan.words import can_read_pictures
 
 DRAWING_KINDS = (*RASTER_KINDS, *VECTOR_KINDS, *CODE_KINDS)
 DEVICE_KINDS = (".csv", ".ttl", ".json", ".zinc")
@@ -45,6 +49,8 @@ class _Sheet:
         Of a raster drawing [px]; else 0.
     dots_per_inch : float or None
         Of a page of a PDF [1/inch].
+    read_text : bool or None
+        Whether names of rooms can be read from a picture here; None of a drawing that is none.
     """
 
     file: str
@@ -52,6 +58,7 @@ class _Sheet:
     width: float = 0.0
     height: float = 0.0
     dots_per_inch: float | None = None
+    read_text: bool | None = None
 
 
 def checked_name(name: str, kinds: tuple[str, ...]) -> str:
@@ -157,8 +164,19 @@ class Upload:
             One of its family, by what is wrong; nothing is kept then.
         """
         sheet = look_at(self.close())
-        self.path.replace(self._target)
+        self.keep()
         return sheet
+
+    def keep(self) -> Path:
+        """Keep it as it is, in place of one of the same name.
+
+        Returns
+        -------
+        Path
+            Where it is now.
+        """
+        self.path.replace(self._target)
+        return self._target
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -193,14 +211,13 @@ def look_at(path: Path, page: int = 1, dots_per_inch: float = 150.0) -> _Sheet:
     kind = file.suffix.lower()
     if kind in RASTER_KINDS:
         drawing = read_drawing(file, page=page, dots_per_inch=dots_per_inch)
-        return _Sheet(file.name, "raster", drawing.grey.shape[1], drawing.grey.shape[0], drawing.dots_per_inch)
+        height, width = drawing.grey.shape
+        return _Sheet(file.name, "raster", width, height, drawing.dots_per_inch, can_read_pictures())
     if kind in CODE_KINDS:
         read_codes(file, _TRIAL_CELL)
         return _Sheet(file.name, "codes")
     return _Sheet(file.name, "vector")
 
-
-Progress = Callable[[str, int, int], None]
 
 _INK, _WALL, _PAPER = 90, 150, 255  # greys of the picture of a drawing that is no image
 
@@ -221,6 +238,8 @@ class _NewFloors:
         To add to the draft's, when these are its first floors [deg].
     remarks : tuple of str
         What a look at the page should confirm.
+    glazing : mapping
+        Windows that the new drawings show: area by zone and facade [m2].
     """
 
     floors: tuple[DraftFloor, ...]
@@ -228,6 +247,7 @@ class _NewFloors:
     shift: tuple[int, int] = (0, 0)
     orientation: float | None = None
     remarks: tuple[str, ...] = ()
+    glazing: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
 
 def add_floors(
@@ -277,15 +297,15 @@ def add_floors(
         )
         for plan, entry, floor in zip(found.plans.floors, entries, found.floors, strict=True)
     ]
-    turned = found.floors[0].survey.turned
-    return _NewFloors(tuple(floors), found.plans.cell_size, orientation=turned, remarks=found.remarks)
+    turned, glazing = found.floors[0].survey.turned, found.plans.glazing
+    return _NewFloors(tuple(floors), found.plans.cell_size, orientation=turned, remarks=found.remarks, glazing=glazing)
 
 
 def _beside(draft: Draft, entries: Sequence[FloorEntry], zoned: Sequence[ZonedFloor], own: Path) -> _NewFloors:
     """Draw new floors on the grid of those that are there; these are moved at most, never drawn again."""
     size = draft.cell_size
     base = _as_surveyed(draft.floors[0], size)
-    placed = align_floors((base, *zoned))[1:]
+    placed = align_floors((base, *distinct_names(zoned, zones_of(draft.floors))))[1:]
     left, top = (min(floor.offset[axis] for floor in placed) for axis in (0, 1))
     phase = ((-left / size) % 1.0, (-top / size) % 1.0)
     plans, corner = draw_cells(placed, size, phase)
@@ -306,7 +326,9 @@ def _beside(draft: Draft, entries: Sequence[FloorEntry], zoned: Sequence[ZonedFl
         for plan, entry, floor in zip(plans, entries, placed, strict=True)
     ]
     remarks = tuple(f"floor {f.name!r}: {remark}" for f in placed for remark in f.survey.remarks)
-    return _NewFloors((*kept, *new), size, shift, remarks=remarks)
+    drawn = {zone: sides for floor in placed for zone, sides in floor.glazing.items()}
+    glazing = clipped_glazing(drawn, facade_areas(FloorPlans(size, tuple(plans)))) if drawn else {}
+    return _NewFloors((*kept, *new), size, shift, remarks=remarks, glazing=glazing)
 
 
 def _as_surveyed(floor: DraftFloor, cell_size: float) -> ZonedFloor:

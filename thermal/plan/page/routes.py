@@ -1,6 +1,5 @@
 """The addresses of the labelling page."""
 
-import json
 from dataclasses import asdict
 from importlib.resources import files
 from pathlib import Path
@@ -10,18 +9,19 @@ from fastapi import FastAPI, Query, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import FileResponse, JSONResponse, Response
-from pydantic import TypeAdapter, ValidationError
 
 from thermal.errors import LabelError, OversizedFileError, PlanError, ReportError, SessionHeldError, ThermalError
 from thermal.plan.drawing import DOTS_PER_INCH, RASTER_KINDS, read_drawing
 from thermal.plan.folder import png_of
-from thermal.plan.guard import first_fault, inside_folder
+from thermal.plan.guard import inside_folder
 from thermal.plan.list import FloorEntry
 from thermal.plan.models import read_devices
+from thermal.plan.page.bodies import checked, entry, read_json
 from thermal.plan.page.desk import LabelDesk
 from thermal.plan.page.draft import zones_of
 from thermal.plan.page.drawings import DEVICE_KINDS, DRAWING_KINDS, WIDEST_PICTURE, Upload, add_floors, look_at
-from thermal.plan.page.reports import Progress
+from thermal.plan.page.jobs import REPORTS, Progress
+from thermal.plan.page.telemetry_routes import add_telemetry
 
 #: What a report may do: its own script in a box without access to the page.
 _REPORT_POLICY = (
@@ -29,7 +29,6 @@ _REPORT_POLICY = (
     "style-src 'unsafe-inline'; img-src data: blob:; font-src data:"
 )
 _MOST_BODY = 60_000_000  # bytes of JSON: four floors of a million cells
-_MOST_WORDS = 100_000  # bytes of any other request
 _TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
 _STATUS: dict[type[ThermalError], int] = {SessionHeldError: 409, OversizedFileError: 413, ReportError: 404}
 
@@ -57,6 +56,7 @@ def routes_of(desk: LabelDesk) -> FastAPI:
     _add_drawings(app, desk)
     _add_jobs(app, desk)
     _add_reports(app, desk)
+    add_telemetry(app, desk)
     return app
 
 
@@ -82,12 +82,12 @@ def _add_draft(app: FastAPI, desk: LabelDesk) -> None:
 
     @app.put("/api/draft")
     async def save(request: Request, window: Window) -> dict[str, Any]:
-        content = _parse_json(await _body(request, _MOST_BODY))
+        content = await read_json(request, _MOST_BODY)
         return await run_in_threadpool(desk.save, window, content)
 
     @app.post("/api/session")
     async def open_session(request: Request) -> dict[str, Any]:
-        asked = _parse_json(await _body(request, _MOST_WORDS))
+        asked = await read_json(request)
         if not isinstance(asked, dict) or not isinstance(asked.get("window"), str) or not asked["window"]:
             raise LabelError("session", "a window's name", repr(asked)[:80])
         previous, take_over = str(asked.get("previous", "")), asked.get("take_over") is True
@@ -159,7 +159,7 @@ def _add_drawings(app: FastAPI, desk: LabelDesk) -> None:
     @app.post("/api/floors")
     async def make_floors(request: Request, window: Window) -> dict[str, Any]:
         desk.sessions.check(window)
-        entries, size = _floor_request(_parse_json(await _body(request, _MOST_WORDS)))
+        entries, size = _floor_request(await read_json(request))
         draft = desk.store.draft
 
         def work(progress: Progress) -> dict[str, Any]:
@@ -191,20 +191,20 @@ def _add_jobs(app: FastAPI, desk: LabelDesk) -> None:
     def stop(number: int) -> dict[str, Any]:
         job = desk.jobs.get(number)
         if job is not None:
-            job.stop.set()
+            desk.jobs.stop(job)
         return {}
 
 
 def _add_reports(app: FastAPI, desk: LabelDesk) -> None:
     @app.get("/api/reports")
     def listed() -> dict[str, Any]:
-        running = [job.to_dict() for kind in desk.reports.kinds if (job := desk.jobs.busy(kind)) is not None]
+        running = [job for job in desk.jobs.unfinished() if job["kind"] in desk.reports.kinds]
         return {"reports": [report.to_dict() for report in desk.reports.found()], "running": running}
 
     @app.post("/api/reports/{kind}")
     def make(kind: str) -> dict[str, Any]:
         busy = desk.jobs.busy(desk.reports.checked_kind(kind))
-        job = busy or desk.jobs.start(kind, lambda progress: desk.reports.make(kind, progress))
+        job = busy or desk.jobs.start(kind, lambda progress: desk.reports.make(kind, progress), REPORTS)
         return job.to_dict()
 
     @app.get("/reports/{key}/{name:path}")
@@ -213,28 +213,11 @@ def _add_reports(app: FastAPI, desk: LabelDesk) -> None:
         return FileResponse(page, media_type="text/html", headers={"content-security-policy": _REPORT_POLICY})
 
 
-async def _body(request: Request, most: int) -> bytes:
-    """Read a body of JSON, up to a size."""
-    kind = request.headers.get("content-type", "").partition(";")[0].strip()
-    LabelError.unless(kind == "application/json", "content-type", "application/json", repr(kind[:60]))
-    parts, size = [], 0
-    async for chunk in request.stream():
-        size += len(chunk)
-        OversizedFileError.unless(size <= most, "body", f"at most {most / 1e6:g} MB", "more")
-        parts.append(chunk)
-    return b"".join(parts)
-
-
 def _floor_request(content: Any) -> tuple[list[FloorEntry], float | None]:
     """Drawings to make floors of, and the size of cells."""
-    try:
-        entries = TypeAdapter(list[FloorEntry]).validate_python(content["floors"])
-        size = TypeAdapter(float | None).validate_python(content.get("cell_size"))
-    except ValidationError as error:
-        raise LabelError(*first_fault(error, "floors")) from error
-    except (TypeError, KeyError, AttributeError) as error:
-        raise LabelError("body", "{'floors': [...]}", repr(content)[:80]) from error
+    entries = checked(list[FloorEntry], entry(content, "floors"), "floors")
     LabelError.unless(entries, "floors", "at least one drawing", "none")
+    size: float | None = checked(float | None, content.get("cell_size"), "cell_size")  # type: ignore[arg-type]
     return entries, size
 
 
@@ -250,27 +233,3 @@ async def _malformed(request: Request, error: Exception) -> Response:
     found = repr(first.get("input"))[:80]
     expected = str(first.get("msg", "a valid value")).removeprefix("Input should be ")
     return await _named(request, LabelError(where, expected, found))
-
-
-def _parse_json(body: bytes) -> Any:
-    """Read the body of a request.
-
-    Parameters
-    ----------
-    body : bytes
-        JSON in UTF-8.
-
-    Returns
-    -------
-    object
-        Plain types.
-
-    Raises
-    ------
-    LabelError
-        It is no JSON, or blocks within blocks without end.
-    """
-    try:
-        return json.loads(body)
-    except (ValueError, RecursionError) as error:  # ValueError: no UTF-8, no JSON, an integer of 5000 digits
-        raise LabelError("body", "JSON", f"{type(error).__name__}: {error}"[:200]) from error

@@ -1,10 +1,9 @@
-"""Case folder behind the labelling page, and who has it open."""
+"""Case folder behind the labelling page."""
 
+import itertools
 import json
 import os
 import tempfile
-import time
-from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -12,9 +11,11 @@ from typing import Any
 import yaml
 
 from thermal.case.building import BuildingFile
+from thermal.case.case import Case
 from thermal.case.load import NAME, load_case, migrate, read_building_file
-from thermal.case.telemetry import check_units, read_telemetry
-from thermal.errors import CaseError, LabelError, SessionHeldError, ThermalError
+from thermal.case.save import TELEMETRY_FILE, save_case
+from thermal.case.telemetry import Telemetry, check_units, read_telemetry
+from thermal.errors import CaseError, LabelError, ThermalError
 from thermal.folders import check_writable
 from thermal.plan.folder import DRAFT, OWN_FOLDER, save_plan_case
 from thermal.plan.guard import inside_folder
@@ -78,7 +79,7 @@ class CaseStore:
         self.draft = _read_draft(self.folder, is_case)
         if own.is_symlink() or (own.exists() and not own.is_dir()):
             raise LabelError(f"{path}: {OWN_FOLDER}", "a folder of the page's own", "something else")
-        for name in ("drawings", "pictures", "reports"):
+        for name in ("drawings", "pictures", "reports", "telemetry"):
             if (own / name).is_symlink():
                 raise LabelError(f"{path}: {OWN_FOLDER}/{name}", "a folder of the page's own", "a link")
             (own / name).mkdir(parents=True, exist_ok=True)
@@ -142,13 +143,60 @@ class CaseStore:
             return False
         return True
 
-    def _write_case(self, draft: Draft) -> None:
+    @property
+    def has_telemetry(self) -> bool:
+        """Whether the case has telemetry: one that the page has made has one column without a value."""
+        return len(self.columns) > 1
+
+    def files_state(self) -> tuple[Any, ...]:
+        """When the files of the case were last changed, to tell whether what was made of them still holds."""
+        self._look_at_telemetry()
+        names = [NAME, self.telemetry, *sorted(path.name for path in self.folder.glob("*.csv"))]
+        files = [self.folder / name for name in names if name]
+        return tuple((file.name, file.stat().st_mtime_ns) for file in files if file.is_file())
+
+    def put_telemetry(self, telemetry: Telemetry, replaces: str = "") -> str:
+        """Give the case other telemetry.
+
+        Parameters
+        ----------
+        telemetry : Telemetry
+            Of the building of the draft, which is a valid case.
+        replaces : str
+            File of telemetry that the page has put there, and that may go; whatever else is there stays.
+
+        Returns
+        -------
+        str
+            File of the telemetry.
+
+        Raises
+        ------
+        CaseError
+            One of its family: telemetry and building do not fit together; nothing is changed then.
+        """
+        before = str(self._content().get("telemetry", ""))
+        ours = before and (before == replaces or not self.has_telemetry)
+        self._write_case(self.draft, telemetry)
+        if ours:
+            inside_folder(self.folder, before, "telemetry").unlink(missing_ok=True)
+        self._find_faults()
+        return self.telemetry
+
+    def _write_case(self, draft: Draft, telemetry: Telemetry | None = None) -> None:
         """Write the case beside, read it back, and move what changed into place, `building.yaml` last."""
         before = self._content()
         with tempfile.TemporaryDirectory(prefix=".case-", dir=self.own) as work:
-            new = save_plan_case(building_of_draft(draft), Path(work) / "case")
+            building, new = building_of_draft(draft), Path(work) / "case"
+            if telemetry is None:
+                save_plan_case(building, new)
+            else:
+                save_case(Case(building, telemetry), new)
             content = yaml.safe_load((new / NAME).read_text(encoding="utf-8"))
-            if "telemetry" in before:
+            if telemetry is not None:  # under a new name: building.yaml goes over to it in one step
+                source, content["telemetry"] = new / content["telemetry"], self._free_name()
+                write_whole(self.folder / content["telemetry"], source.read_bytes())
+            elif "telemetry" in before:
                 content |= {key: before[key] for key in ("telemetry", "units")}
             elif not (self.folder / content["telemetry"]).exists():
                 write_whole(self.folder / content["telemetry"], (new / content["telemetry"]).read_bytes())
@@ -167,6 +215,11 @@ class CaseStore:
         _replace_if_other(self.folder / NAME, (note + text).encode("utf-8"))
         for plan in {*files.values()} - {floor["plan"] for floor in content["floors"]}:
             inside_folder(self.folder, plan, "plan").unlink(missing_ok=True)
+
+    def _free_name(self) -> str:
+        stem, suffix = Path(TELEMETRY_FILE).stem, Path(TELEMETRY_FILE).suffix
+        names = (f"{stem}{'' if k == 1 else f'_{k}'}{suffix}" for k in itertools.count(1))
+        return next(name for name in names if not (self.folder / name).exists())
 
 
 def _filled(content: dict[str, Any]) -> dict[str, Any]:
@@ -219,128 +272,3 @@ def _with_positions(fresh: Draft, draft: Draft) -> Draft:
     devices = tuple(d.model_copy(update=placed.get((d.name, d.zone), {})) for d in fresh.devices)
     kept = {"floors": floors, "devices": devices, "seconds": draft.seconds, "revision": draft.revision}
     return fresh.model_copy(update=kept)
-
-
-_LOCK = "open.json"
-
-#: A window that has said nothing for so long is gone [s]; browsers let hidden windows speak once a minute.
-PATIENCE = 150.0
-
-
-@dataclass
-class _Holder:
-    window: str
-    since: float
-    seen: float
-
-
-class Sessions:
-    """The window that may change a case, and the lock that tells other programs so.
-
-    Parameters
-    ----------
-    own : Path
-        The page's own folder of the case.
-    take_over : bool
-        Whether to take the case from another program.
-
-    Raises
-    ------
-    SessionHeldError
-        Another program that is still running labels the case.
-    """
-
-    def __init__(self, own: Path, *, take_over: bool = False) -> None:
-        self._file = own / _LOCK
-        self._id = f"{os.getpid()}-{time.time_ns()}"
-        self._holder: _Holder | None = None
-        other = self._lock()
-        if other is not None and not take_over and _is_running(other.get("process")):
-            expected = "a case that nobody labels at the moment"
-            found = f"one that process {other.get('process')} has open since {other.get('since')}"
-            raise SessionHeldError(str(own.parent), expected, found, "close that one, or pass --take-over")
-        since = time.strftime("%Y-%m-%d %H:%M")
-        content = {"program": self._id, "process": os.getpid(), "since": since}
-        write_whole(self._file, json.dumps(content).encode("utf-8"))
-
-    def _lock(self) -> dict[str, Any] | None:
-        try:
-            content = json.loads(self._file.read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            return None
-        return content if isinstance(content, dict) else None
-
-    def open(self, window: str, *, previous: str = "", take_over: bool = False) -> dict[str, Any]:
-        """Ask for the case.
-
-        Parameters
-        ----------
-        window : str
-            Who asks.
-        previous : str
-            Who that was before it was loaded anew.
-        take_over : bool
-            Whether to take the case from another window.
-
-        Returns
-        -------
-        dict
-            ``mine``: whether the window may change the case; else ``since`` and ``seen``, how long ago another window
-            came and last said something [s].
-        """
-        now = time.monotonic()
-        holder = self._holder
-        if holder is None or take_over or now - holder.seen > PATIENCE or holder.window in (window, previous):
-            self._holder = _Holder(window, now, now)
-            return {"mine": True}
-        return {"mine": False, "since": now - holder.since, "seen": now - holder.seen}
-
-    def close(self, window: str) -> None:
-        """Give the case back, when it is that window's.
-
-        Parameters
-        ----------
-        window : str
-            Who closes.
-        """
-        if self._holder is not None and self._holder.window == window:
-            self._holder = None
-
-    def check(self, window: str) -> None:
-        """Refuse a change by a window that does not have the case.
-
-        Parameters
-        ----------
-        window : str
-            Who asks.
-
-        Raises
-        ------
-        SessionHeldError
-            Another window, or another program, has it.
-        """
-        lock = self._lock()
-        if lock is None or lock.get("program") != self._id:
-            raise SessionHeldError("session", "a case that this program has open", "another program has it")
-        if self._holder is None or self._holder.window != window:
-            raise SessionHeldError("session", "the window that has the case", "another window has taken it")
-        self._holder.seen = time.monotonic()
-
-    def end(self) -> None:
-        """Take the lock away, when it is this program's."""
-        lock = self._lock()
-        if lock is not None and lock.get("program") == self._id:
-            self._file.unlink(missing_ok=True)
-
-
-def _is_running(process: object) -> bool:
-    """Whether a process is there; one of another user is."""
-    if not isinstance(process, int) or process <= 0 or process == os.getpid():
-        return False
-    try:
-        os.kill(process, 0)
-    except PermissionError:
-        return True
-    except (OSError, OverflowError):
-        return False
-    return True

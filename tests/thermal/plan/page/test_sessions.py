@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from thermal.errors import SessionHeldError
-from thermal.plan.page import store as _sessions
-from thermal.plan.page.store import Sessions
+from thermal.plan.page import sessions as _sessions
+from thermal.plan.page.sessions import Sessions
 
 
 def test_one_window_has_the_case(tmp_path: Path) -> None:

@@ -40,7 +40,7 @@ def test_a_new_case_is_written_as_soon_as_it_is_one(tmp_path: Path, draft_with: 
         "telemetry.parquet",
         "labelling",
     }
-    assert {p.name for p in store.own.iterdir()} == {"labelling.json", "drawings", "pictures", "reports"}
+    assert {p.name for p in store.own.iterdir()} == {"labelling.json", "drawings", "pictures", "reports", "telemetry"}
 
 
 def test_what_was_on_the_page_is_there_again(tmp_path: Path, draft_with: Make) -> None:

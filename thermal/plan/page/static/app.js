@@ -6,8 +6,9 @@ import * as edits from "./edits.js";
 import { importFiles, openImport } from "./importer.js";
 import { renderPanels, showTab } from "./panels.js";
 import * as view from "./plan.js";
-import { openReports } from "./reports.js";
+import { openReports, resume } from "./reports.js";
 import * as store from "./store.js";
+import { openTelemetry } from "./telemetry.js";
 import { TOOLS, choose, drawToolbar, escape, holdSpace, nextDevice, planKey, removeSelected, skipDevice, tool } from "./tools.js";
 
 const { page } = store;
@@ -118,7 +119,7 @@ async function takeOver() {
 }
 
 const KEYS = {
-  "?": openHelp, i: () => openImport(), m: () => edits.merge(), "+": () => view.zoom(1.3), "=": () => view.zoom(1.3), "-": () => view.zoom(1 / 1.3), 0: () => view.fit(),
+  "?": openHelp, i: () => openImport(), t: () => openTelemetry(), m: () => edits.merge(), "+": () => view.zoom(1.3), "=": () => view.zoom(1.3), "-": () => view.zoom(1 / 1.3), 0: () => view.fit(),
   Delete: removeSelected, Backspace: removeSelected, Escape: escape, n: () => edits.addDevice(), F2: () => store.tell({ show: "selection" }),
   "[": () => goFloor(page.floor - 1), "]": () => goFloor(page.floor + 1), PageDown: () => goFloor(page.floor - 1), PageUp: () => goFloor(page.floor + 1),
 };
@@ -148,7 +149,7 @@ function openHelp() {
     ["Arrow keys", "From zone to zone; with a drawing tool, a cell (Shift: five)."], ["Enter", "Place the device in the focused zone; begin or end a line; show the zone."],
     ["Space", "Add the focused zone to the selection; hold to pan."], ["S", "While placing: skip this device."], ["Esc", "Stop what is being drawn, then the tool, then the selection."],
     ["Ctrl+Z, Ctrl+Shift+Z", "Undo, redo."], ["[ ]", "Floor below, floor above."], ["+ − 0", "Zoom in, out, show all. The wheel zooms too; the middle button pans."],
-    ["N", "New device."], ["I", "Import drawings."], ["F2", "Go to the details of what is selected."], ["?", "This list."],
+    ["N", "New device."], ["I", "Import drawings."], ["T", "Telemetry."], ["F2", "Go to the details of what is selected."], ["?", "This list."],
   ];
   openDialog("Keyboard shortcuts", [
     el("table", { class: "keys" }, el("tbody", {}, rows.map(([key, text]) => el("tr", {}, el("th", { scope: "row" }, el("kbd", {}, key)), el("td", {}, text))))),
@@ -162,7 +163,8 @@ function wire() {
   byId("import").onclick = byId("empty-import").onclick = () => openImport();
   byId("add-floor").onclick = () => { edits.addFloor(); renderAll(); };
   byId("empty-draw").onclick = () => { edits.addFloor(); choose("room"); };
-  byId("reports").onclick = openReports;
+  byId("reports").onclick = byId("job").onclick = openReports;
+  byId("telemetry").onclick = openTelemetry;
   byId("help").onclick = openHelp;
   byId("theme").onclick = () => {
     const dark = document.documentElement.dataset.theme || (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
@@ -191,6 +193,7 @@ async function start() {
     await store.load();
     if (!held.mine) showHeld(held);
     store.startClocks();
+    resume(page.running);
     if (!page.draft.floors.length && held.mine) {
       const { drawings } = await api.get("api/drawings");
       if (drawings.length) openImport();

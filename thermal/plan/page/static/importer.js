@@ -5,9 +5,10 @@ import { byId, closeDialog, el, field, openDialog, select as choice, toast } fro
 import { decodeFloor } from "./grid.js";
 import { takeList } from "./panels.js";
 import { change, page, save, tell } from "./store.js";
+import { takeTable } from "./telemetry.js";
 
 const DRAWINGS = [".png", ".jpg", ".jpeg", ".pdf", ".dxf", ".csv", ".npy", ".npz"];
-const LISTS = [".ttl", ".json", ".zinc"];
+const LISTS = [".ttl", ".json", ".zinc"], TABLES = [".parquet", ".xlsx", ".txt"];
 const sheets = []; // what is to be made floors of
 let chosen = null;
 
@@ -27,7 +28,7 @@ function addSheet(found) {
   const like = sheets.find((s) => s.points?.length === 2 && s.width === found.width && s.height === found.height);
   const sheet = {
     ...found, floor: freeFloor(), floorHeight: page.draft.floors[0]?.height || 3, method: found.dots_per_inch ? "paper" : "points", points: like ? like.points.map((p) => [...p]) : [], distance: like?.distance || "",
-    paper: 100, pixelSize: "", page: 1, cell: 0.5, unit: "", wide: 1.3, small: 4, include: found.kind !== "unreadable",
+    paper: 100, pixelSize: "", page: 1, cell: 0.5, unit: "", wide: 1.3, small: 4, glass: 1.5, words: Boolean(found.read_text), include: found.kind !== "unreadable",
   };
   sheets.push(sheet);
   sheets.sort((a, b) => a.file.localeCompare(b.file, undefined, { numeric: true }));
@@ -36,12 +37,16 @@ function addSheet(found) {
 
 const isCodes = async (file) => /^[\s\d,;.eE+-]*$/.test((await file.slice(0, 400).text()).replace(/^\ufeff/, ""));
 
+// Whether a CSV has a time stamp early in its second row: a table of telemetry, no list of devices.
+const isTable = async (file) => /^[^\n]*\n([^\n,;\t]*[,;\t]){0,2}"?(\d{4}-\d\d?-\d\d?|\d\d?[./]\d\d?[./]\d{2,4}|\d{10,13}(?=[,;\t"]))/.test(await file.slice(0, 400_000).text());
+
 // Files from the dialog, or dropped on the page: drawings become floors, lists become devices.
 export async function importFiles(files) {
   let drawings = 0;
   for (const file of files) {
     const kind = suffix(file.name);
     try {
+      if (TABLES.includes(kind) || (kind === ".csv" && (await isTable(file)))) { await takeTable(file); continue; }
       if (LISTS.includes(kind) || (kind === ".csv" && !(await isCodes(file)))) { await takeList(file); continue; }
       status(`Reading ${file.name}…`);
       addSheet(await api.upload("api/drawings", file));
@@ -83,11 +88,11 @@ function ready(sheet) {
 function entryOf(sheet) {
   const entry = { name: sheet.floor.trim(), file: sheet.file, height: Number(sheet.floorHeight), widest_door: Number(sheet.wide), smallest_zone: Number(sheet.small) };
   if (sheet.kind === "codes") return { name: entry.name, file: entry.file, height: entry.height, smallest_zone: entry.smallest_zone, cell_size: Number(sheet.cell) };
-  if (sheet.kind === "vector") return { ...entry, ...(sheet.unit ? { unit: Number(sheet.unit) } : {}) };
+  if (sheet.kind === "vector") return { ...entry, window_height: Number(sheet.glass), ...(sheet.unit ? { unit: Number(sheet.unit) } : {}) };
   const scale = {
     points: () => ({ points: sheet.points, distance: Number(sheet.distance) }), paper: () => ({ paper: Number(sheet.paper) }), pixel: () => ({ metres_per_pixel: Number(sheet.pixelSize) }),
   }[sheet.method]();
-  return { ...entry, scale, page: Number(sheet.page), ...(sheet.dots_per_inch ? { dots_per_inch: sheet.dots_per_inch } : {}) };
+  return { ...entry, scale, page: Number(sheet.page), ...(sheet.words ? { read_text: true } : {}), ...(sheet.dots_per_inch ? { dots_per_inch: sheet.dots_per_inch } : {}) };
 }
 
 function draw() {
@@ -155,7 +160,9 @@ function sheetPanel(sheet) {
       el("label", { class: "check" }, el("input", { type: "checkbox", checked: sheet.include, onchange: set(sheet, "include") }), " use this drawing")),
     scale,
     el("details", {}, el("summary", {}, "More settings"), el("div", { class: "grid four" },
-      field("Widest door [m]", input(sheet, "wide", "number")), field("Smaller rooms join their neighbour [m²]", input(sheet, "small", "number")), away)));
+      field("Widest door [m]", input(sheet, "wide", "number")), field("Smaller rooms join their neighbour [m²]", input(sheet, "small", "number")),
+      sheet.kind === "vector" && field("Height of the windows that it shows [m]", input(sheet, "glass", "number")),
+      sheet.kind === "raster" && el("label", { class: "check" }, el("input", { type: "checkbox", id: "sheet-words", checked: sheet.words, disabled: !sheet.read_text, onchange: set(sheet, "words") }), sheet.read_text ? " read the names of rooms from the picture" : " names of rooms in a picture: run apt install tesseract-ocr"), away)));
 }
 
 function rasterScale(sheet) {
@@ -234,7 +241,7 @@ function take(found, entries) {
   const first = page.draft.floors.length === 0, [dx, dy] = found.shift, at = page.draft.floors.length;
   const devices = page.draft.devices.map((d) => (d.x !== null ? { ...d, x: d.x + dx, y: d.y + dy } : d));
   const turned = first && found.orientation ? { orientation: Math.round((((page.draft.orientation + found.orientation + 540) % 360) - 180) * 100) / 100 } : {};
-  change("import drawings", { floors: found.floors.map(decodeFloor), cell_size: found.cell_size, devices, ...turned });
+  change("import drawings", { floors: found.floors.map(decodeFloor), cell_size: found.cell_size, devices, glazing: { ...page.draft.glazing, ...found.glazing }, ...turned });
   page.floor = at;
   const names = new Set(entries.map((entry) => entry.file));
   for (let k = sheets.length - 1; k >= 0; k--) if (names.has(sheets[k].file)) sheets.splice(k, 1);

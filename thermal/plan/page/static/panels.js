@@ -5,6 +5,7 @@ import { byId, el, field, select as choice, toast } from "./dom.js";
 import * as edits from "./edits.js";
 import { floorOf, page, change, save, select, tell } from "./store.js";
 import * as view from "./plan.js";
+import { placeFinder } from "./place.js";
 import { choose, nextDevice, tool } from "./tools.js";
 
 const TYPES = [["vav", "VAV terminal"], ["fan_coil", "Fan coil"], ["electric_heater", "Electric heater"], ["radiator", "Radiator"],
@@ -58,10 +59,24 @@ function redraw(panel, children) {
 
 const busy = (panel) => panel.contains(document.activeElement) && document.activeElement.matches("input:not([type=checkbox]):not([type=search]), select");
 
+function correctMarks(panel, fresh) {
+  for (const box of [fresh, ...fresh.querySelectorAll(".field")].filter((e) => e.matches(".field"))) {
+    const input = box.querySelector("input, select"), old = input?.id && panel.querySelector(`#${CSS.escape(input.id)}`)?.closest(".field");
+    if (!old) continue;
+    const mark = old.querySelector("input, select");
+    for (const name of ["aria-invalid", "aria-describedby"]) { if (input.hasAttribute(name)) mark.setAttribute(name, input.getAttribute(name)); else mark.removeAttribute(name); }
+    old.querySelector(".message")?.remove();
+    const message = box.querySelector(".message");
+    if (message) old.append(message);
+  }
+}
+
 export function renderPanels(why = "") {
   const panel = byId(`panel-${shown.tab}`);
-  if (why === "verdict" && busy(panel)) return; // an answer must not take a field away from under somebody's fingers
-  redraw(panel, { devices: devicesPanel, selection: selectionPanel, building: buildingPanel, problems: problemsPanel }[shown.tab]());
+  const drawn = { devices: devicesPanel, selection: selectionPanel, building: buildingPanel, problems: problemsPanel }[shown.tab];
+  // An answer must not take a field away from under somebody's fingers; what it says of fields is said all the same.
+  if (why === "verdict" && busy(panel)) { for (const part of drawn().flat(3)) if (part instanceof Element) correctMarks(panel, part); return; }
+  redraw(panel, drawn());
 }
 
 function listed() {
@@ -233,11 +248,12 @@ function buildingPanel() {
   return [
     el("h2", {}, "Building"),
     field("Name of the case", text(page.draft.name, (v) => change("rename the case", { name: v.trim() }), { id: "case-name" }), messageOf("site", "name")),
+    placeFinder((found) => change("choose the place", { site: found }), off),
     el("div", { class: "grid" }, numbers.map(([key, label]) => field(label, number(place[key], (v) => site(key, v), { id: `site-${key}` }), messageOf("site", key))),
       field("Orientation [°], true north to the plan's up", number(orientation, (v) => change("orientation", { orientation: v || 0 }), { id: "orientation" }), messageOf("site", "orientation"))),
     field("Time zone, IANA name", text(place.timezone, (v) => site("timezone", v.trim()), { id: "site-timezone", list: "timezones", placeholder: "Europe/Berlin" }), messageOf("site", "timezone")), zones,
     !place.timezone && el("button", { type: "button", class: "link", disabled: off, onclick: () => site("timezone", Intl.DateTimeFormat().resolvedOptions().timeZone) }, "Take this computer's"),
-    el("p", { class: "soft" }, `Cells of ${size} m. ${page.telemetry ? `Telemetry: ${page.telemetry}.` : "No telemetry yet: put it into the case folder when the page is done."}`),
+    el("p", { class: "soft" }, `Cells of ${size} m. ${page.telemetry ? `Telemetry: ${page.telemetry}.` : "No telemetry yet: button Telemetry, or drop the file on this page."}`),
     el("h3", {}, "Windows: share of the facade that is glass"),
     el("p", { class: "soft" }, "For the whole building. Floors below and single zones (tab Selection) may differ; an empty field takes what stands in grey."),
     ratioFields(""), ...[...errorsOf("case", "")].map((f) => el("p", { class: "message" }, f.message)),

@@ -10,8 +10,31 @@ const WORDS = {
   diagnose: ["Diagnose", "Where, which and how far model and building disagree. Minutes."],
 };
 const jobs = new Map(); // kind -> {state, stop}
+let ready = ""; // what was done since somebody last looked
+
+// Go on with what was running before the page was loaded anew.
+export function resume(running) {
+  for (const state of running) if (page.reports.includes(state.kind) && !jobs.has(state.kind)) watch(state.kind, state);
+}
+
+// What goes on is seen without the list of reports, too.
+function renderJob() {
+  const pill = byId("job"), states = [...jobs.values()].map((job) => job.state), state = states.find((s) => s.state === "runs") || states[0];
+  const more = states.length > 1 ? ` +${states.length - 1}` : "";
+  pill.hidden = !state && !ready;
+  pill.className = `pill ${state ? "busy" : "good"}`;
+  pill.textContent = state ? `${title(state.kind)}: ${brief(state)}${more}` : ready;
+}
+
+const title = (kind) => WORDS[kind]?.[0] || kind;
+
+const brief = (state) => (state.state === "waiting" ? "waits" : `${state.total ? `${Math.floor((100 * state.done) / state.total)} % · ` : ""}${time(state.seconds)}`);
+
+const time = (seconds) => (seconds < 90 ? `${Math.round(seconds)} s` : `${Math.round(seconds / 60)} min`);
 
 export async function openReports() {
+  ready = "";
+  renderJob();
   openDialog("Reports", el("div", { id: "reports-body", class: "reports" }, "Loading…"), { wide: true });
   await refresh();
 }
@@ -21,7 +44,7 @@ async function refresh() {
   try {
     await save();
     const { reports, running } = await api.get("api/reports");
-    for (const state of running) if (!jobs.has(state.kind)) watch(state.kind, state);
+    resume(running);
     draw(reports);
   } catch (error) {
     byId("reports-body").textContent = `${error.refusal || error.name}: ${error.message}`;
@@ -41,7 +64,7 @@ function draw(reports) {
     el("td", {}, el("a", { href: api.address(`reports/${report.key}/report.html`), target: "_blank", rel: "noopener" }, capital(report.kind === "other" ? report.title : report.kind))),
     el("td", { class: "found" }, report.verdict), el("td", { class: "soft" }, report.title || "made here"), el("td", { class: "soft" }, moment(report.time))));
   body.replaceChildren(
-    errors ? el("p", { class: "message" }, "Reports can be made as soon as the case is valid.") : !page.telemetry ? el("p", { class: "soft" }, "The case has no telemetry yet: check works, calibrate and diagnose wait for it (buildingmpc import-telemetry).") : "",
+    errors ? el("p", { class: "message" }, "Reports can be made as soon as the case is valid.") : !page.telemetry ? el("p", { class: "soft" }, "The case has no telemetry yet: check works, calibrate and diagnose wait for it (button Telemetry).") : "",
     el("div", { class: "cards" }, cards),
     reports.length ? el("table", {}, el("caption", {}, "Reports of this case"), el("thead", {}, el("tr", {}, ["Report", "What it found", "Folder", "Written"].map((h) => el("th", { scope: "col" }, h)))), el("tbody", {}, rows))
       : el("p", { class: "soft" }, "No reports yet. Those of results folders inside the case, or given with --results, are listed here."),
@@ -52,9 +75,9 @@ const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
 const moment = (seconds) => new Date(seconds * 1000).toLocaleString([], { dateStyle: "short", timeStyle: "short" });
 
-const words = (state) => `${state.stage || "working"} · ${Math.round(state.seconds)} s`;
+const words = (state) => (state.state === "waiting" ? "waits for the report before it" : `${state.stage || "working"} · ${time(state.seconds)}`);
 
-async function make(kind) {
+export async function make(kind) {
   try {
     await save();
     watch(kind, await api.send(`api/reports/${kind}`));
@@ -67,21 +90,25 @@ async function make(kind) {
 async function watch(kind, started) {
   const stop = new AbortController();
   jobs.set(kind, { state: started, stop });
+  renderJob();
   try {
     const report = await api.job(started, (state) => {
       jobs.set(kind, { state, stop });
+      renderJob();
       const box = byId(`job-${kind}`);
       if (!box) return;
       box.firstChild.textContent = words(state);
       if (state.total) Object.assign(box.children[1], { max: state.total, value: state.done });
     }, stop.signal);
-    toast(`${WORDS[kind]?.[0] || kind}: the report is there.`);
+    if (!byId("reports-body")) ready = `${title(kind)}: report is there`;
+    toast(`${title(kind)}: the report is there.`);
     return report;
   } catch (error) {
-    toast(`${error.refusal || error.name}: ${error.message}`, "error");
+    toast(error.refusal === "Stopped" ? `${title(kind)}: stopped; earlier reports are as they were.` : `${title(kind)}: ${error.refusal || error.name}: ${error.message}`, error.refusal === "Stopped" ? "" : "error");
     return null;
   } finally {
     jobs.delete(kind);
+    renderJob();
     refresh();
   }
 }

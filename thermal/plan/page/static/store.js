@@ -14,6 +14,7 @@ export const page = {
   zones: {}, // areas by zone, as the server measures them
   telemetry: "",
   reports: [],
+  running: [], // jobs that were not done when the page was loaded
   floor: 0,
   selection: { zones: [], devices: [] },
   mode: "loading", // edit, read
@@ -39,6 +40,27 @@ function encode(draft) {
   return { ...draft, seconds: workSeconds(), floors: draft.floors.map(encodeFloor) };
 }
 
+// What is known of the draft again after something else than a change of it, such as new telemetry.
+export async function reloadVerdict() {
+  const content = await api.get("api/state");
+  takeVerdict(content);
+  page.written = !page.findings.some((finding) => finding.level === "error");
+  tell("verdict");
+}
+
+// A thing that was just changed is not wrong until the server has looked at it.
+function unjudged(before, after) {
+  const same = (list, name) => list(before).find((thing) => thing.name === name) === list(after).find((thing) => thing.name === name);
+  return (finding) => {
+    if (finding.level !== "error") return true;
+    if (finding.kind === "site") return finding.name in { name: 0, orientation: 0 } ? before[finding.name] === after[finding.name] : before.site[finding.name] === after.site[finding.name];
+    if (finding.kind === "device") return same((draft) => draft.devices, finding.name);
+    if (finding.kind === "floor") return same((draft) => draft.floors, finding.name);
+    if (finding.kind === "zone") return before.glazing[finding.name] === after.glazing[finding.name] && before.floors === after.floors;
+    return before.glazing_ratio === after.glazing_ratio;
+  };
+}
+
 function takeVerdict(content) {
   page.findings = content.findings;
   page.zones = content.zones;
@@ -49,6 +71,7 @@ export async function load() {
   const content = await api.get("api/state");
   page.draft = decode(content.draft);
   page.reports = content.reports;
+  page.running = content.running;
   takeVerdict(content);
   page.written = !page.findings.some((finding) => finding.level === "error");
   const left = restore(content);
@@ -82,7 +105,9 @@ export function change(label, changes) {
   past.push({ label, draft: page.draft, floor: page.floor });
   if (past.length > DEEP) past.shift();
   future.length = 0;
-  page.draft = { ...page.draft, ...changes };
+  const before = page.draft;
+  page.draft = { ...before, ...changes };
+  page.findings = page.findings.filter(unjudged(before, page.draft));
   prune();
   schedule();
   tell("draft");

@@ -1,0 +1,45 @@
+"""A building without windows is said on the pages of calibrations and diagnoses, and of folders of cases."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import calibration.fleet.run
+from calibration.fleet.case import CaseOutcome
+from mpc.cli import calibrate as _calibrate
+from mpc.reports.page import case_warnings, render
+from thermal import Case, FloorPlans, load_bundled_case
+
+
+@pytest.fixture
+def dark() -> Case:
+    """Make the bundled case without its windows."""
+    case = load_bundled_case()
+    plans = case.building.geometry
+    assert isinstance(plans, FloorPlans) and plans.glazing
+    return replace(case, building=replace(case.building, geometry=replace(plans, glazing={})), path=Path("some/where"))
+
+
+def test_a_page_begins_with_what_spoils_its_numbers(dark: Case) -> None:
+    assert case_warnings(load_bundled_case()) == []
+    (told,) = case_warnings(dark)
+    assert told.startswith("The building has no windows") and "buildingmpc label where," in told
+    page = render("base", {"subtitle": "", "verdict": "It fits.", "warnings": [told]})
+    assert '<p class="warning" role="alert">The building has no windows' in page
+    assert page.index("It fits.") < page.index("no windows")
+
+
+def test_a_folder_of_cases_says_which_have_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    outcomes = [CaseOutcome(name, "calibrated", 0.5, 0.4, has_windows=name == "lit") for name in ("lit", "dark")]
+    monkeypatch.setattr(calibration.fleet.run, "calibrate_many", lambda *_, **__: outcomes)
+    settings = {"horizon": "6h"}
+    assert _calibrate._many("calibrate", [tmp_path / "lit"], tmp_path / "out", settings, 1, None, False, False) == 0
+    told = capsys.readouterr()
+    assert "warning: dark: 1 of 2 buildings have no windows" in told.err
+    assert "calibrated, no windows" in told.out and told.out.count("no windows") == 1
+    assert outcomes[1].to_dict()["has_windows"] is False

@@ -1,0 +1,159 @@
+"""Jobs of the labelling page: work with progress, one piece after another, that can be stopped."""
+
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from threading import Event, Lock
+from typing import Any
+
+from thermal.errors import LabelError
+
+Progress = Callable[[str, int, int], None]
+Work = Callable[[Progress], Any]
+
+_KEPT = 50  # jobs whose end is remembered
+
+
+class _StoppedError(LabelError):
+    """A job that was stopped."""
+
+
+@dataclass
+class _Job:
+    """A piece of work.
+
+    Parameters
+    ----------
+    number : int
+        To ask for it [-].
+    kind : str
+        What is being done.
+    """
+
+    number: int
+    kind: str
+    state: str = "waiting"
+    stage: str = ""
+    done: int = 0
+    total: int = 0
+    result: Any = None
+    error: dict[str, str] | None = None
+    started: float = field(default_factory=time.monotonic)
+    stop: Event = field(default_factory=Event)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Give it as plain types, for JSON."""
+        keys = ("number", "kind", "state", "stage", "done", "total", "result", "error")
+        return {key: getattr(self, key) for key in keys} | {"seconds": round(time.monotonic() - self.started, 1)}
+
+
+#: Who waits for whom: what the page itself does takes seconds, and does not wait for a report, which takes minutes.
+PAGE, REPORTS = "page", "reports"
+
+
+class Jobs:
+    """The work of a page, done one piece after another on each of its lanes."""
+
+    def __init__(self) -> None:
+        self._pools = {lane: ThreadPoolExecutor(max_workers=1, thread_name_prefix=lane) for lane in (PAGE, REPORTS)}
+        self._jobs: dict[int, _Job] = {}
+        self._lock = Lock()
+        self._count = 0
+
+    def start(self, kind: str, work: Work, lane: str = PAGE) -> _Job:
+        """Begin a piece of work.
+
+        Parameters
+        ----------
+        kind : str
+            What is being done.
+        work : callable
+            Called with a progress callback; returns plain types.
+        lane : str
+            `PAGE` or `REPORTS`.
+
+        Returns
+        -------
+        _Job
+            To be asked for by its number.
+        """
+        with self._lock:
+            self._count += 1
+            job = self._jobs[self._count] = _Job(self._count, kind)
+            for number in [n for n in self._jobs if n <= self._count - _KEPT]:
+                del self._jobs[number]
+        self._pools[lane].submit(self._run, job, work)
+        return job
+
+    def get(self, number: int) -> _Job | None:
+        """Look a job up.
+
+        Parameters
+        ----------
+        number : int
+            Of the job [-].
+
+        Returns
+        -------
+        _Job or None
+            None when there is none of that number.
+        """
+        return self._jobs.get(number)
+
+    def busy(self, kind: str) -> _Job | None:
+        """Find a job of a kind that is not done.
+
+        Parameters
+        ----------
+        kind : str
+            What is being done.
+
+        Returns
+        -------
+        _Job or None
+            The first.
+        """
+        return next(
+            (job for job in list(self._jobs.values()) if job.kind == kind and job.state in ("waiting", "runs")), None
+        )
+
+    def stop(self, job: _Job) -> None:
+        """Stop a job: at once while it waits, else at its next sign of progress.
+
+        Parameters
+        ----------
+        job : _Job
+            To stop.
+        """
+        job.stop.set()
+        if job.state == "waiting":
+            job.state = "stopped"
+
+    def unfinished(self) -> list[dict[str, Any]]:
+        """Give the jobs that are not done, oldest first, as plain types: a page loaded anew goes on with them."""
+        return [job.to_dict() for job in list(self._jobs.values()) if job.state in ("waiting", "runs")]
+
+    def end(self) -> None:
+        """Stop what is being done, at its next sign of progress."""
+        for job in list(self._jobs.values()):
+            job.stop.set()
+        for pool in self._pools.values():
+            pool.shutdown(wait=False, cancel_futures=True)
+
+    def _run(self, job: _Job, work: Work) -> None:
+        def progress(stage: str, done: int, total: int) -> None:
+            if job.stop.is_set():
+                raise _StoppedError("stopped")
+            job.stage, job.done, job.total = stage, done, total
+
+        try:
+            progress("", 0, 0)
+            job.state, job.started = "runs", time.monotonic()
+            job.result = work(progress)
+            job.state = "done"
+        except _StoppedError:
+            job.state = "stopped"
+        except Exception as error:  # whatever it is, the page says so
+            job.error = {"error": type(error).__name__, "message": str(error)}
+            job.state = "failed"
