@@ -37,6 +37,9 @@ class Fabric:
         By leaks and ventilation [1/h].
     heavy : bool
         Whether walls have brick inside; plaster board on studs otherwise.
+    goods : float
+        Heat capacity of a zone's air and of the goods that follow it, over that of the air alone [-]; 3 stands for a
+        few kilograms of goods a square metre.
     """
 
     wall: float
@@ -45,6 +48,7 @@ class Fabric:
     glass: tuple[float, float]
     air_changes: float
     heavy: bool = True
+    goods: float = 1.0
 
 
 def start(fabric: Fabric) -> Objects:
@@ -70,6 +74,7 @@ def start(fabric: Fabric) -> Objects:
             "north_axis": 0.0, "terrain": "Suburbs", "solar_distribution": "FullExterior",
             "minimum_number_of_warmup_days": 6, "maximum_number_of_warmup_days": 40,
         }},
+        "ZoneCapacitanceMultiplier:ResearchSpecial": {"goods": {"temperature_capacity_multiplier": fabric.goods}},
         "WindowMaterial:SimpleGlazingSystem": {
             "glass": {"u_factor": fabric.glass[0], "solar_heat_gain_coefficient": fabric.glass[1]}
         },
@@ -139,7 +144,8 @@ def construction(name: str, layers: Sequence[tuple[float, float, float, float]])
     layers : sequence of tuple of float
         Thickness [m], conductivity [W/m/K], density [kg/m3] and heat capacity [J/kg/K], from the outside inwards.
     """
-    names = [f"{name} layer {number}" for number in range(1, len(layers) + 1)]
+    # named by what they are: EnergyPlus sees by names that a wall is the same from both sides
+    names = [f"{1000 * d:g} mm of {k:g} W/m/K, {rho:g} kg/m3, {c:g} J/kg/K" for d, k, rho, c in layers]
     keys = ("thickness", "conductivity", "density", "specific_heat")
     materials = {
         each: {"roughness": "MediumRough", **dict(zip(keys, layer, strict=True))}

@@ -13,7 +13,7 @@ from typing import Any
 import yaml
 from energyplus_trials.frame import STEPS_PER_HOUR, Objects
 
-from foreign_models import house
+from foreign_models import flats, house, office, shop
 from foreign_models.periods import DAYS, WARM_UP, starts
 from foreign_models.prices import dynamic_prices
 from mpc.adapters.energyplus.input import weather_path
@@ -56,6 +56,13 @@ PLANTS = {
     "house": ForeignPlant(
         "House of 192 m2 for five, heated floor, air-to-water heat pump of 15 kW", house.house, house.description
     ),
+    "flats": ForeignPlant("Three flats of 70 m2 with electric baseboards", flats.flats, flats.description),
+    "office": ForeignPlant(
+        "Office of 480 m2, four zones with fan coils, air-to-water heat pump of 40 kW",
+        office.office,
+        office.description,
+    ),
+    "shop": ForeignPlant("Shop of 216 m2 with a unitary heat pump of 24 kW", shop.shop, shop.description),
 }
 
 
