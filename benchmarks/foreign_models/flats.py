@@ -11,7 +11,7 @@ from foreign_models.thermostats import clock, comfort, present, thermostat, ther
 
 FABRIC = ep.Fabric(wall=0.06, roof=0.1, floor=0.06, glass=(1.8, 0.6), air_changes=0.5, goods=3.0)
 WIDTH, DEPTH, HEIGHT = 10.0, 7.0, 2.6  # m
-_WARM, _COOL, _LEAD = 20.5, 17.0, 2  # degC and h, of the thermostats' own clocks
+_COOL = 18.0  # degC, of the thermostats' own clocks
 _RADIANT = 0.3  # of a baseboard's heat [-], EnergyPlus' examples of `ZoneHVAC:Baseboard:RadiantConvective:Electric`
 
 
@@ -58,7 +58,7 @@ def flats() -> Objects:
         glass = {"south": 8.0, "north": 4.0}
         ep.merge(model, ep.box(zone, (k * WIDTH, 0.0), (WIDTH, DEPTH, HEIGHT), glass, behind))
         ep.merge(model, ep.inside(zone, FABRIC, WIDTH * DEPTH, flat.people, f"{zone} presence", flat.appliances))
-        ep.merge(model, thermostat(zone, clock(flat.home, _WARM, _COOL, _LEAD), [_WARM] * 24))
+        ep.merge(model, thermostat(zone, clock(flat.home, cool=_COOL), clock(ALL_DAY)))
         ep.merge(model, ep.equipment(zone, [("ZoneHVAC:Baseboard:RadiantConvective:Electric", f"{zone} baseboard")]))
         ep.merge(model, {
             "Schedule:Compact": {f"{zone} presence": ep.daily([float(h) for h in flat.home], [1.0] * 24)},
@@ -85,11 +85,10 @@ def description() -> dict[str, Any]:
             "volume": WIDTH * DEPTH * HEIGHT, "comfort": comfort(flat.home, ALL_DAY),
             "people": present(flat.people, flat.home, ALL_DAY),
         }  # fmt: skip
-        heater = name.replace("flat", "baseboard")
-        measured, acted = thermostat_points(zone, name, heater)
+        measured, acted = thermostat_points(zone, name)
         told["measurements"] |= measured | {
-            f"{heater}/electrical_power_sensor": power,
-            f"{heater}/heating_power_sensor": power,  # all of it; EnergyPlus' own output leaves the radiant part out
+            f"{name}/electrical_power_sensor": power,
+            f"{name}/heating_power_sensor": power,  # all of it; EnergyPlus' own output leaves the radiant part out
         }
         told["actuators"] |= acted
         told["energy"]["electricity"].append(power)

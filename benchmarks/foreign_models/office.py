@@ -28,7 +28,6 @@ _PUMPS = 150.0  # W, each
 RESET = (45.0, -10.0, 35.0, 15.0)
 WORK = [8 <= hour < 18 for hour in range(24)]
 NOBODY = [False] * 24
-_WARM, _COOL, _LEAD = 20.5, 17.0, 2  # degC and h, of the thermostats' own clock
 _HOT, _COLD, _UNIT = "Coil:Heating:Water", "Coil:Cooling:Water", "ZoneHVAC:FourPipeFanCoil"
 _RESET = """
 SET wanted_water = {at_zero} - {slope} * outdoor
@@ -48,7 +47,7 @@ def office() -> Objects:
         behind = {side: by_place[i + a, k + b] for side, (a, b) in beside.items() if (i + a, k + b) in by_place}
         ep.merge(model, ep.box(zone, (i * LENGTH, k * DEPTH), (LENGTH, DEPTH, HEIGHT), glass, behind))
         ep.merge(model, ep.inside(zone, FABRIC, LENGTH * DEPTH, PEOPLE, "presence", APPLIANCES))
-        ep.merge(model, thermostat(zone, clock(WORK, _WARM, _COOL, _LEAD), [_COOL] * 24, cooling=26.0))
+        ep.merge(model, thermostat(zone, clock(WORK), clock(NOBODY), cooled=True))
         ep.merge(model, ep.equipment(zone, [(_UNIT, f"{zone} fan coil")], f"{zone} unit out", f"{zone} unit in"))
         ep.merge(model, _fan_coil(zone))
     ep.merge(model, {
@@ -151,16 +150,16 @@ def description() -> dict[str, Any]:
     told: dict[str, Any] = {"zones": {}, "measurements": {}, "actuators": {}}
     electricity = [power, pump, "COLD LOOP pump, Pump Electricity Rate"]
     for zone in ZONES:
-        name, heater, fan = zone.lower(), f"fan_coil_{zone.lower()}", f"{zone} fan, Fan Electricity Rate"
+        name, fan = zone.lower(), f"{zone} fan, Fan Electricity Rate"
         told["zones"][name] = {
             "temperature": f"{zone}, Zone Mean Air Temperature", "floor_area": LENGTH * DEPTH,
             "volume": LENGTH * DEPTH * HEIGHT, "comfort": comfort(WORK, NOBODY),
             "people": present(PEOPLE, WORK, NOBODY),
         }  # fmt: skip
-        measured, acted = thermostat_points(zone, name, heater)
+        measured, acted = thermostat_points(zone, name)
         told["measurements"] |= measured | {
-            f"{heater}/heating_power_sensor": f"{zone} fan coil, Fan Coil Heating Rate",
-            f"{heater}/supply_fan_power_sensor": fan,
+            f"{name}/heating_power_sensor": f"{zone} fan coil, Fan Coil Heating Rate",
+            f"{name}/supply_fan_power_sensor": fan,
         }
         told["actuators"] |= acted
         electricity.append(fan)

@@ -54,7 +54,7 @@ class ForeignPlant:
 
 PLANTS = {
     "house": ForeignPlant(
-        "House of 192 m2 for five, heated floor, air-to-water heat pump of 15 kW", house.house, house.description
+        "House of 192 m2 for five, heated floor, air-to-water heat pump of 12 kW", house.house, house.description
     ),
     "flats": ForeignPlant("Three flats of 70 m2 with electric baseboards", flats.flats, flats.description),
     "office": ForeignPlant(

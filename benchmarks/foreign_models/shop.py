@@ -23,18 +23,16 @@ _FAN = (250.0, 0.5)  # Pa, and total efficiency [-]: 600 W
 SOURCE = "ASHRAE901_OfficeSmall_STD2019_Denver"
 WEEKDAY = [8 <= hour < 20 for hour in range(24)]
 WEEKEND = [9 <= hour < 18 for hour in range(24)]
-_WARM, _COOL, _LEAD = 20.5, 16.0, 2  # degC and h, of the thermostat's own clock
 _HEATING, _COOLING = "Coil:Heating:DX:SingleSpeed", "Coil:Cooling:DX:SingleSpeed"
 
 
 def shop() -> Objects:
     """Return the shop's input."""
     model = ep.start(FABRIC)
-    setpoints = [clock(hours, _WARM, _COOL, _LEAD) for hours in (WEEKDAY, WEEKEND)]
     parts: list[Any] = [
         ep.box(ZONE, (0.0, 0.0), (LENGTH, DEPTH, HEIGHT), {"south": 22.0}, {"east": "", "west": ""}),
         ep.inside(ZONE, FABRIC, LENGTH * DEPTH, PEOPLE, "presence", APPLIANCES),
-        thermostat(ZONE, *setpoints, cooling=26.0),
+        thermostat(ZONE, clock(WEEKDAY), clock(WEEKEND), cooled=True),
         ep.equipment(ZONE, [("AirLoopHVAC:UnitarySystem", UNIT)], f"{UNIT} out", f"{UNIT} in"),
         {"Schedule:Compact": {"presence": ep.daily([float(h) for h in WEEKDAY], [float(h) for h in WEEKEND])}},
         _unit(), *_coils(),
@@ -50,8 +48,9 @@ def _unit() -> Objects:
         flows |= {f"{mode}_supply_air_flow_rate": AIR, f"{mode}_supply_air_flow_rate_method": "SupplyAirFlowRate"}
     return {
         "AirLoopHVAC:UnitarySystem": {UNIT: {
-            "control_type": "Load", "controlling_zone_or_thermostat_location": ZONE, "air_inlet_node_name": f"{UNIT} in",
-            "air_outlet_node_name": f"{UNIT} out", "availability_schedule_name": ep.ALWAYS,
+            "control_type": "Load", "controlling_zone_or_thermostat_location": ZONE,
+            "air_inlet_node_name": f"{UNIT} in", "air_outlet_node_name": f"{UNIT} out",
+            "availability_schedule_name": ep.ALWAYS,
             "supply_fan_object_type": "Fan:OnOff", "supply_fan_name": f"{UNIT} fan", "fan_placement": "BlowThrough",
             "supply_air_fan_operating_mode_schedule_name": "fan cycles", "heating_coil_object_type": _HEATING,
             "heating_coil_name": f"{UNIT} heating", "cooling_coil_object_type": _COOLING,
@@ -101,7 +100,7 @@ def _curve(source: InputFile, name: str) -> Objects:
 
 def description() -> dict[str, Any]:
     """Return what ``plant.yaml`` says of zones, points and actuators."""
-    measured, acted = thermostat_points(ZONE, "shop", "heat_pump")
+    measured, acted = thermostat_points(ZONE, "shop")
     power = [f"{UNIT}, Unitary System Electricity Rate"]
     return {
         "zones": {"shop": {
