@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,7 @@ def day_means(weather: Path) -> np.ndarray:
     return np.asarray(values.reshape(365, 24).mean(axis=1) - 273.15)
 
 
+@cache
 def starts(weather: Path) -> dict[str, str]:
     """Begin of each period, ``coldest`` and ``typical``.
 

@@ -37,6 +37,6 @@ def dynamic_prices(timezone: str, seed: int = 20) -> pd.DataFrame:
     wind = np.zeros(len(stamps))
     for k in range(1, len(stamps)):
         wind[k] = _KEEP * wind[k - 1] + draw[k]
-    wholesale = MEAN + SPREAD * _SHAPE[stamps.hour] + wind + _WEEKEND * (stamps.dayofweek >= 5)
+    wholesale = MEAN + SPREAD * _SHAPE[stamps.hour] + wind + _WEEKEND * (stamps.day_of_week >= 5)
     price = FEE + np.maximum(wholesale, _FLOOR)
     return pd.DataFrame({"timestamp": [s.isoformat() for s in stamps], "dynamic": np.round(price, 5)})
