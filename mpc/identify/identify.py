@@ -90,9 +90,9 @@ def identify(telemetry: PlantTelemetry, machines: Sequence[Machine], progress: P
     loads = _loads(telemetry, machines, data, box)
     signals = data.heat
     bought = {name: telemetry.column(name) for name in CARRIERS if name in telemetry.frame}
-    maps = map_machines(machines, loads, signals, bought, _above(telemetry, machines))
+    maps, base = map_machines(machines, loads, signals, bought, _above(telemetry, machines))
     notes = _notes(telemetry, machines, suns)
-    model = PlantModel(telemetry.site.name, telemetry.step, box, tuple(maps))
+    model = PlantModel(telemetry.site.name, telemetry.step, box, maps, base)
     return Identified(model, telemetry, data, loads, tuple(errors), split, notes)
 
 

@@ -150,5 +150,11 @@ def find_machines(
             heat or power or len(chosen) == 1, f"actuator {name}", f"a sensor {entity}/{HEATING_POWER} or {_POWERS[0]}",
             "none", "add it to `measurements`, so that machines can be told apart",
         )  # fmt: skip
-        made.append(Machine(by_name[name], role, (entity,) if entity in zones else tuple(zones), heat, power))
+        made.append(Machine(by_name[name], role, _served(entity, zones), heat, power))
     return tuple(made)
+
+
+def _served(entity: str, zones: Sequence[str]) -> tuple[str, ...]:
+    """Zones of an entity: the one of its name, or whose last word it ends in as ``fan_coil_north``; else all."""
+    own = [z for z in zones if z == entity] or [z for z in zones if z.split("_")[-1] == entity.split("_")[-1]]
+    return (own[0],) if len(own) == 1 else tuple(zones)

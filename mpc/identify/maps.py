@@ -192,7 +192,7 @@ class Loads:
         return {name: values for name, values in found.items() if not left_out.get(name, False)}
 
 
-def regress(loads: Loads, values: FloatArray, machines: Sequence[int]) -> list[Curve]:
+def regress(loads: Loads, values: FloatArray, machines: Sequence[int]) -> tuple[list[Curve], float]:
     """Regress what is measured on the features of machines, a constant beside them.
 
     Parameters
@@ -208,6 +208,8 @@ def regress(loads: Loads, values: FloatArray, machines: Sequence[int]) -> list[C
     -------
     list of Curve
         One a machine.
+    float
+        The constant [W].
 
     Raises
     ------
@@ -232,12 +234,13 @@ def regress(loads: Loads, values: FloatArray, machines: Sequence[int]) -> list[C
         {name: (float(found.params[k]), float(found.bse[k])) for k, (owner, name) in enumerate(owners) if owner == m}
         for m in machines
     ]
-    return [Curve({n: c for n, (c, _) in p.items()}, {n: d for n, (_, d) in p.items()}) for p in parts]
+    curves = [Curve({n: c for n, (c, _) in p.items()}, {n: d for n, (_, d) in p.items()}) for p in parts]
+    return curves, float(found.params[0])
 
 
 def map_machines(
     machines: Sequence[Machine], loads: Loads, signals: FloatArray, bought: Mapping[str, FloatArray], above: FloatArray
-) -> list[MachineMap]:
+) -> tuple[tuple[MachineMap, ...], dict[str, float]]:
     """Make the map of each machine.
 
     Parameters
@@ -252,18 +255,25 @@ def map_machines(
         Power of each kind that the plant buys [W].
     above : ndarray, shape (n_time, n_machine)
         How far setpoints lie above the air of their zones [K]; NaN of machines.
+
+    Returns
+    -------
+    tuple of MachineMap
+        In the order of the machines.
+    dict of str to float
+        Power of each kind that no machine explains [W].
     """
     everyone = range(len(machines))
-    heats = [regress(loads, signals[:, m], [m])[0] for m in everyone]
+    heats = [regress(loads, signals[:, m], [m])[0][0] for m in everyone]
     powers = {kind: regress(loads, values, everyone) for kind, values in bought.items() if np.ptp(values) > 1.0}
     made = []
     for m, machine in enumerate(machines):
-        found = MachineMap(machine, "setpoint", heats[m], {kind: curves[m] for kind, curves in powers.items()})
+        found = MachineMap(machine, "setpoint", heats[m], {kind: curves[m] for kind, (curves, _) in powers.items()})
         if machine.role == "machine":
             made.append(replace(found, operation=_operation(found)))
         else:
             made.append(replace(found, above=_local(loads.level[:, m], above[:, m])))
-    return made
+    return tuple(made), {kind: base for kind, (_, base) in powers.items()}
 
 
 def _operation(found: MachineMap) -> Operation:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
@@ -33,12 +33,15 @@ class PlantModel:
         Zones.
     maps : tuple of MachineMap
         Machines, in the order of the sources of the grey box.
+    base : mapping of str to float
+        Power of each kind that is bought whatever the machines do [W].
     """
 
     name: str
     step: float
     box: GreyBox
     maps: tuple[MachineMap, ...]
+    base: Mapping[str, float] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """Values for a file."""
@@ -51,7 +54,10 @@ class PlantModel:
             }
             for m in self.maps
         ]  # fmt: skip
-        return {"format": FORMAT, "name": self.name, "step": self.step, "grey_box": self.box.to_dict(), "machines": maps}
+        return {
+            "format": FORMAT, "name": self.name, "step": self.step, "grey_box": self.box.to_dict(), "machines": maps,
+            "base": dict(self.base),
+        }  # fmt: skip
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
@@ -72,7 +78,7 @@ class PlantModel:
         try:
             maps = tuple(_map_of(entry) for entry in content["machines"])
             box = GreyBox.from_dict(content["grey_box"])
-            return cls(str(content["name"]), float(content["step"]), box, maps)
+            return cls(str(content["name"]), float(content["step"]), box, maps, dict(content["base"]))
         except (KeyError, TypeError, ValueError, MpcError, CalibrationError) as error:
             raise ControlError(where, expected, f"{type(error).__name__}: {error}") from error
 

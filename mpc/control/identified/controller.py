@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -88,6 +89,7 @@ class PlannedAction(dict[str, float]):
     def __init__(self, values: Mapping[str, float], stamp: pd.Timestamp, source: str, reasons: tuple[str, ...]) -> None:
         super().__init__(values)
         self.stamp, self.source, self.reasons = stamp, source, reasons
+        self.step, self.seconds = 900.0, 0.0
         self.solution: StageSolution | None = None
         self.zone: FloatArray = np.empty((0, 0))
         self.power: FloatArray = np.empty((0, 2))
@@ -130,7 +132,7 @@ class IdentifiedController:
         self._actuators = {a.name: a for a in actuators}
         self._problem, self._observer = IdentifiedProblem(model), GreyBoxObserver(model)
         self._solver: StageSolver | None = None
-        self._before: tuple[Ahead, FloatArray, FloatArray] | None = None
+        self._before: tuple[Ahead, FloatArray] | None = None
         self._plan: StageSolution | None = None
         self._runs = [_Runs() for _ in model.maps]
         self._hold = max(round(self.settings.run / model.step), 1)
@@ -161,6 +163,7 @@ class IdentifiedController:
         """
         if forecast is None:
             raise ControlError("mpc", "forecasts of the plant", "none", "describe its weather and prices")
+        begin = time.perf_counter()
         ahead = Ahead.of(self.model, forecast, self._location)
         self._observe(measurements, ahead)
         if self._solver is None or self._solver.n_steps != len(ahead.outdoor):
@@ -171,10 +174,10 @@ class IdentifiedController:
         source = "optimal plan" if solution is not None else "rules"
         reasons = () if solution is not None else ("the solver found no plan",)
         self._note(levels)
-        planned = self._observer.state[: len(self.model.box.zones)] if solution is None else solution.states[1]
-        self._before, self._plan = (ahead, levels, self._inside(planned, ahead)), solution
+        self._before, self._plan = (ahead, levels), solution
         stamp = measurements.stamp
         action = PlannedAction(self._values(levels, solution, ahead), stamp, source, reasons)
+        action.step, action.seconds = self.model.step, time.perf_counter() - begin
         if solution is not None:
             action.solution = solution
             action.zone = solution.states[:, : len(self.model.box.zones)] + REFERENCE
@@ -186,11 +189,11 @@ class IdentifiedController:
         if self._before is None:
             self._observer.start(measurements, float(ahead.outdoor[0]))
             return
-        before, levels, planned = self._before
+        before, levels = self._before
         self._observer.update(measurements, before, levels)
         if self.conformal is not None:
             realised = self._inside(self._observer.zones(measurements) - REFERENCE, before)
-            self.conformal.update(planned, realised, before.occupied[0])
+            self.conformal.update(realised, before.occupied[0])
 
     def _inside(self, zone: FloatArray, ahead: Ahead) -> FloatArray:
         """Distance from the lower edge of the band of the first step, positive inside, shape (n_zone,) [K].
@@ -305,6 +308,8 @@ class IdentifiedController:
         """Expected electricity and other carriers, shape (N, 2) [W]."""
         emitter = REFERENCE + solution.states[:-1] @ self.model.box.emitter_weights
         powers = np.zeros((len(solution.decisions), 2))
+        for carrier, base in self.model.base.items():
+            powers[:, int(carrier != "electricity")] += base
         for k, found in enumerate(self.model.maps):
             for carrier, curve in found.powers.items():
                 value: Any = found.at(curve, solution.decisions[:, k], ahead.outdoor, emitter[:, k])
