@@ -78,7 +78,8 @@ class GreyBoxData:
 
     def pushes(self, box: GreyBox) -> FloatArray:
         """Inputs of a network's state space, shape (n_time, n_input)."""
-        return np.column_stack([self.outdoor - REFERENCE, self.sun, box.delivered(self.heat, self.outdoor), self.gain])
+        return np.column_stack([self.outdoor - REFERENCE, self.sun, box.delivered(self.heat, self.outdoor),
+                                self.gain + box.parts["constant gain"]])  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

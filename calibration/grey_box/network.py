@@ -128,6 +128,7 @@ class GreyBox:
             "share of nodes": nm * (_HEATED - 1),
             "share of zones": int(self.serves.sum()) if nz > 1 else 0,
             "slope of heat": sum(not m for m in self.metered),
+            "constant gain": nz,
         }
 
     @cached_property
@@ -149,7 +150,8 @@ class GreyBox:
     @cached_property
     def scale(self) -> FloatArray:
         """How far parameters may be from `centre` without a reason [as the parameters], shape (n_parameter,)."""
-        spreads = {"aperture": 2.0 * _APERTURE * float(self.areas.mean()), "slope of heat": 0.3}
+        mean = float(self.areas.mean())
+        spreads = {"aperture": 2.0 * _APERTURE * mean, "slope of heat": 0.3, "constant gain": UNMEASURED * mean}
         return np.concatenate([np.full(count, spreads.get(kind, 1.5)) for kind, count in self.sizes.items()])
 
     @cached_property

@@ -22,8 +22,12 @@ class ExcitationSettings:
     hold : tuple of float
         Shortest and longest time that a level is held [s]: several minutes of a machine's start up, and times over
         which a floor answers.
-    guard : float
-        Distance from an edge of the comfort band at which the plant gets its actuators back [K].
+    ahead : tuple of float
+        How long before it holds a lower and an upper edge count [s]: a heated floor warms in hours, and gives its heat
+        off over half a day.
+    guard : tuple of float
+        Distance from the lower and from the upper edge at which the plant gets a machine back that drives there [K];
+        the upper one is larger, as a floor goes on to give heat.
     back : float
         Shortest time that the plant then keeps them [s].
     part_load : float
@@ -33,7 +37,8 @@ class ExcitationSettings:
     """
 
     hold: tuple[float, float] = (1800.0, 10_800.0)
-    guard: float = 0.2
+    ahead: tuple[float, float] = (10_800.0, 43_200.0)
+    guard: tuple[float, float] = (0.2, 1.0)
     back: float = 3600.0
     part_load: float = 0.35
     seed: int = 0
@@ -74,7 +79,7 @@ class Excitation:
         measurements : Measurements
             Zone temperatures count [K].
         forecast : Forecast or None
-            Comfort bands of the next hour count [K].
+            Comfort bands ahead count [K].
         """
         k, chosen = self._count, dict[str, float]()
         self._count += 1
@@ -99,14 +104,14 @@ class Excitation:
         """Coldest and warmest distance of the served zones from the lower and upper edges, and the edges [K]."""
         if forecast is None:
             return None
-        rows = max(round(3600.0 / self.step_seconds), 1)
+        soon, later = (max(round(s / self.step_seconds), 1) for s in self.settings.ahead)
         found = []
         for zone in machine.serves:
             name = f"{zone}/{ZONE_TEMPERATURE}"
             if name not in measurements or not np.isfinite(measurements[name]):
                 return None
-            low = float(forecast.table[f"{zone}/comfort_lower_temperature"].iloc[:rows].max())
-            high = float(forecast.table[f"{zone}/comfort_upper_temperature"].iloc[:rows].min())
+            low = float(forecast.table[f"{zone}/comfort_lower_temperature"].iloc[:soon].max())
+            high = float(forecast.table[f"{zone}/comfort_upper_temperature"].iloc[:later].min())
             found.append((measurements[name] - low, high - measurements[name], low, high))
         below, above, lows, highs = zip(*found, strict=True)
         return min(below), min(above), max(lows), min(highs)
@@ -116,9 +121,8 @@ class Excitation:
         if place is None or machine.role == "setpoint":
             return False
         full = value > 0.5 * (machine.actuator.lowest + machine.actuator.highest)
-        return place[0] < (-self.settings.guard if full else self.settings.guard) or (
-            place[1] < (self.settings.guard if full else -self.settings.guard)
-        )
+        cold, warm = self.settings.guard
+        return place[1] < warm if full else place[0] < cold
 
     def _draw(self, machine: Machine, place: tuple[float, float, float, float], k: int) -> None:
         """Draw a level and how long it is held."""
@@ -127,12 +131,12 @@ class Excitation:
         self._until[machine.name] = k + int(random.integers(shortest, longest + 1))
         low, high = actuator.lowest, actuator.highest
         if machine.role == "setpoint":
-            lower, upper = place[2] + self.settings.guard, place[3] - self.settings.guard
+            lower, upper = place[2] + self.settings.guard[0], place[3] - self.settings.guard[0]
             value = random.uniform(min(lower, upper), max(lower, upper))
             self._value[machine.name] = float(np.clip(value, low, high))
             return
-        warm = place[0] / max(place[0] + place[1], 0.1)  # 0 at the lower edge, 1 at the upper one
-        share = float(np.clip(0.9 - 0.8 * warm, 0.1, 0.9))
+        room = max(place[0] + place[1] - self.settings.guard[1], 0.1)
+        share = float(np.clip(0.9 - 0.8 * place[0] / room, 0.05, 0.95))
         least = actuator.minimum if actuator.minimum is not None else low + 0.2 * (high - low)
         if random.random() > share:
             self._value[machine.name] = low

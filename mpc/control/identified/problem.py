@@ -39,7 +39,7 @@ class Ahead:
     sun : ndarray, shape (N, n_sun)
         Irradiances [W/m2].
     gain : ndarray, shape (N, n_zone)
-        Heat of people [W].
+        Heat of people, and the constant one [W].
     prices : ndarray, shape (N, n_carrier)
         Of each of `CARRIERS` [currency/kWh].
     lower, upper : ndarray, shape (N, n_zone)
@@ -82,7 +82,8 @@ class Ahead:
         people = of_zones("occupancy_count_sensor") if f"{zones[0]}/occupancy_count_sensor" in table else None
         gains = of_zones("internal_gain") if f"{zones[0]}/internal_gain" in table else np.zeros((len(table), len(zones)))
         return cls(
-            forecast.values([OUTDOOR_TEMPERATURE], fill="hold")[:, 0], np.nan_to_num(sun), gains,
+            forecast.values([OUTDOOR_TEMPERATURE], fill="hold")[:, 0], np.nan_to_num(sun),
+            gains + model.box.parts["constant gain"],
             np.column_stack([known(_PRICES.get(carrier, "")) for carrier in CARRIERS]),
             of_zones("comfort_lower_temperature"), of_zones("comfort_upper_temperature"),
             np.ones((len(table), len(zones)), dtype=bool) if people is None else people > 0.0,
