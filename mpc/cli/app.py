@@ -20,6 +20,7 @@ from mpc.cli.doctor import doctor
 from mpc.cli.effects import effects
 from mpc.cli.evaluate import check, evaluate, simulate
 from mpc.cli.experiment import experiment
+from mpc.cli.identify import identify
 from mpc.cli.imports import import_devices, import_plan, import_telemetry
 from mpc.cli.monitor import monitor
 from mpc.cli.options import switch, value
@@ -115,7 +116,7 @@ def _report(error: Exception, command: str, json: bool) -> int:
 
 for _command in (
     *(demo, doctor, check, import_plan, import_devices, import_telemetry, label),
-    *(simulate, evaluate, calibrate, diagnose, experiment, monitor, effects, control, compare, serve),
+    *(simulate, evaluate, calibrate, diagnose, experiment, monitor, effects, identify, control, compare, serve),
 ):
     app.command()(_guarded(_command))
 
