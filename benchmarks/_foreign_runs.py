@@ -2,38 +2,46 @@
 
 from __future__ import annotations
 
+import json
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from _foreign_rules import FullSpeed, Own, ProportionalIntegral
-from foreign_models.periods import DAYS, WARM_UP, starts
+from _foreign_rules import ProportionalIntegral
+from foreign_models.periods import DAYS, starts
 from foreign_models.plants import PLANTS, write_plant
 
-from mpc.adapters.described.load import load_plant
 from mpc.adapters.energyplus.input import weather_path
-from mpc.adapters.energyplus.signals import EnergyPlusSignalPlant
-from mpc.errors import PlantError
+from mpc.baselines.plants import LEAD, FullSpeed, OwnControl
+from mpc.identify.excitation import ExcitationSettings
+from mpc.identify.identify import identify
+from mpc.identify.model import FILE, PlantModel, read_model
 from mpc.kpi.kpis import measure_kpis
 from mpc.loop.plant import Controller, Measurements
 from mpc.loop.run import ClosedLoopRun, run_closed_loop
 from mpc.scenario.forecast import Forecast
 from mpc.scenario.scenario import Scenario
+from mpc.studies.described import PlantStudy, experiment_period, run_experiment
 
-#: Starts are those of compressors: of what has these points and this name.
+#: Length of the experiment that a plant is identified on [d].
+EXPERIMENT = 14
+#: Starts are those of the compressor, by its power.
 _COMPRESSOR = "heat_pump/electrical_power_sensor"
 _RUNS = 200.0  # W that a compressor draws when it runs; crankcase heaters draw 50
 _COLD = 0.01  # K below the band that count as time below it
 
-RULES = {
-    "own": lambda plant: Own(),
-    "rule": lambda plant: FullSpeed(plant.actuators, plant.zone_names),
-    "long rule": lambda plant: FullSpeed(plant.actuators, plant.zone_names, lead=6.0),
-    "pi": lambda plant: ProportionalIntegral(plant.actuators, plant.zone_names),
+#: Controllers by name, of a study and its plant.
+CONTROLLERS: dict[str, Callable[[PlantStudy, Any], Controller]] = {
+    "own": lambda study, plant: OwnControl(),
+    "rule": lambda study, plant: study.full_speed(plant),
+    "long rule": lambda study, plant: FullSpeed(study.machines(plant), lead=2.0 * LEAD),
+    "pi": lambda study, plant: ProportionalIntegral(study.machines(plant)),
+    "mpc": lambda study, plant: study.optimal(plant),
+    "mpc perfect": lambda study, plant: study.optimal(plant),
 }
 
 
@@ -58,49 +66,61 @@ class Timed:
         return chosen
 
 
-def period(name: str, which: str) -> dict[str, Any]:
-    """Return the period of a description: ``coldest`` or ``typical`` of a plant."""
-    begin = starts(weather_path(PLANTS[name].weather))[which]
-    return {"start": begin, "days": DAYS, "warm_up_days": WARM_UP}
+def run(name: str, which: str, controller: str, out: Path) -> dict[str, Any]:
+    """Let a controller run a plant in its ``coldest`` or ``typical`` period; optimal control is identified first."""
+    perfect = controller == "mpc perfect"
+    folder = out / ("plants_foreseen" if perfect else "plants")
+    path = write_plant(name, folder, "none" if perfect else "day_ahead")
+    model, spent = identified(name, out) if controller.startswith("mpc") else (None, {})
+    begin = pd.Timestamp(starts(weather_path(PLANTS[name].weather))[which])
+    study = PlantStudy(path, start=f"{begin:%Y-%m-%d}", end=f"{begin + pd.Timedelta(days=DAYS):%Y-%m-%d}", model=model)
+    with study.plant() as plant:
+        timed = Timed(CONTROLLERS[controller](study, plant))
+        loop = run_closed_loop(plant, timed, forecasts=True)
+        return account(loop, study.scenario(plant), timed.seconds) | spent
 
 
-def run_rule(name: str, which: str, controller: str, folder: Path) -> dict[str, Any]:
-    """Let a rule run a plant, or its own control."""
-    with load_plant(write_plant(name, folder), changes={"period": period(name, which)}) as plant:
-        timed = Timed(RULES[controller](plant))
-        run = run_closed_loop(plant, timed, forecasts=controller != "own")
-        return account(run, scenario_of(plant), timed.seconds)
+def identified(name: str, out: Path) -> tuple[PlantModel, dict[str, Any]]:
+    """Identify a plant by an experiment beside its coldest period, or read what came of it: model, and what it took."""
+    path, folder = write_plant(name, out / "plants"), out / "models" / name
+    file = folder / "spent.json"
+    if not file.exists():
+        begin = time.process_time()
+        study = PlantStudy(path, None, *experiment_period(path, None, EXPERIMENT))
+        made = run_experiment(study, EXPERIMENT, ExcitationSettings())
+        found = identify(made.telemetry, made.machines)
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / FILE).write_text(json.dumps(found.model.to_dict()) + "\n", encoding="utf-8")
+        kpis = measure_kpis(made.run.record, made.scenario)
+        spent = {"identify_cpu_seconds": time.process_time() - begin, "experiment_cost": kpis.cost_tot,
+                 "experiment_discomfort": kpis.tdis_tot}  # fmt: skip
+        file.write_text(json.dumps(spent) + "\n", encoding="utf-8")
+    return read_model(folder), dict(json.loads(file.read_text(encoding="utf-8")))
 
 
-def scenario_of(plant: EnergyPlusSignalPlant) -> Scenario:
-    """Return prices and bands of a plant."""
-    if plant.forecaster is None:
-        raise PlantError("foreign plant", "prices in its description", "none")
-    return plant.forecaster.scenario
-
-
-def account(run: ClosedLoopRun, scenario: Scenario, seconds: list[float]) -> dict[str, Any]:
+def account(loop: ClosedLoopRun, scenario: Scenario, seconds: list[float]) -> dict[str, Any]:
     """Measure a run.
 
     Parameters
     ----------
-    run : ClosedLoopRun
+    loop : ClosedLoopRun
         Two weeks.
     scenario : Scenario
         Prices and bands.
     seconds : list of float
         CPU time of each action [s].
     """
-    kpis = measure_kpis(run.record, scenario)
-    parts = round(scenario.grid.step / run.record.step)
-    lower = np.repeat(scenario.lower, parts, axis=0)[: run.record.n_steps]
-    cold = (run.record.zone_temperature[1:] < lower - _COLD).sum(axis=0) * run.record.step / 3600.0
+    record = loop.record
+    kpis = measure_kpis(record, scenario)
+    parts = round(scenario.grid.step / record.step)
+    lower = np.repeat(scenario.lower, parts, axis=0)[: record.n_steps]
+    cold = (record.zone_temperature[1:] < lower - _COLD).sum(axis=0) * record.step / 3600.0
     days = kpis.hours / 24.0
     return {
         "cost": kpis.cost_tot, "energy": kpis.ener_tot, "discomfort": kpis.tdis_tot,
         "below": float(np.mean([z.below for z in kpis.zones])), "above": float(np.mean([z.above for z in kpis.zones])),
         "zones": {z.zone: {"below": z.below, "above": z.above, "largest_below": z.largest_below} for z in kpis.zones},
-        "hours_below": float(cold.mean()), "starts_a_day": _starts(run.measurements, days),
+        "hours_below": float(cold.mean()), "starts_a_day": _starts(loop.measurements, days),
         "cpu_seconds": float(np.sum(seconds)), "days": days,
     }  # fmt: skip
 

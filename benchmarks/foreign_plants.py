@@ -7,7 +7,9 @@ the coldest and in a typical period of its place, after a week under its own con
 - *own*: the plant's own control;
 - *rule*: without a model: machines at full speed on and off, thermostats at the lower edge of the band, both with
   set-back and a lead of 3 h; *long rule*: with a lead of 6 h;
-- *pi*: a PI to the speed of a machine that has one.
+- *pi*: a PI to the speed of a machine that has one;
+- *mpc*: the library's, after an experiment of two weeks beside the coldest period (``identify``, then ``control``),
+  with weather forecasts that are wrong as day-ahead ones are; *mpc perfect*: the same with the weather that comes.
 
 Run: ``python benchmarks/foreign_plants.py --out results/foreign_plants [--publish]`` with the extra ``[energyplus]``.
 What is finished is kept, one file a run, and the same command goes on from there. Writes ``foreign_plants.json`` and
@@ -25,7 +27,7 @@ from pathlib import Path
 from typing import Any
 
 from _code import code
-from _foreign_runs import RULES, run_rule
+from _foreign_runs import CONTROLLERS, run
 from _table import markdown, write
 from foreign_models.plants import PLANTS
 
@@ -34,6 +36,7 @@ from mpc.errors import EnergyPlusError, MpcError
 PERIODS = ("coldest", "typical")
 TITLES = {
     "own": "own control", "rule": "full speed or set-back, lead 3 h", "long rule": "the same, lead 6 h", "pi": "PI",
+    "mpc": "MPC, identified", "mpc perfect": "the same, weather known",
 }  # fmt: skip
 COLUMNS = ("plant", "period", "controller", "cost, EUR/m²", "against own, %", "below the band, K h a zone",
            "above, K h a zone", "time below, h a zone", "starts a day", "CPU, s")  # fmt: skip
@@ -53,7 +56,7 @@ def perform(name: str, which: str, controller: str, out: Path) -> dict[str, Any]
         return dict(json.loads(path.read_text(encoding="utf-8")))
     data: dict[str, Any] = {"plant": name, "period": which, "controller": controller, "code": code()}
     try:
-        data |= run_rule(name, which, controller, out / "plants")
+        data |= run(name, which, controller, out)
     except EnergyPlusError:
         raise
     except MpcError as error:
@@ -67,18 +70,18 @@ def perform(name: str, which: str, controller: str, out: Path) -> dict[str, Any]
 
 def table_of(runs: list[dict[str, Any]]) -> str:
     """Lay the results out, failures with their reason."""
-    own = {(run["plant"], run["period"]): run["cost"] for run in runs if run["controller"] == "own"}
+    own = {(r["plant"], r["period"]): r["cost"] for r in runs if r["controller"] == "own" and "cost" in r}
     rows = []
-    for run in runs:
-        head = (run["plant"], run["period"], TITLES[run["controller"]])
-        if "failure" in run:
-            rows.append((*head, f"failed: {run['failure']}", *[""] * (len(COLUMNS) - 4)))
+    for row in runs:
+        head = (row["plant"], row["period"], TITLES[row["controller"]])
+        if "failure" in row:
+            rows.append((*head, f"failed: {row['failure']}", *[""] * (len(COLUMNS) - 4)))
             continue
-        base, starts = own.get((run["plant"], run["period"]), math.nan), run["starts_a_day"]
+        base, starts = own.get((row["plant"], row["period"]), math.nan), row["starts_a_day"]
         rows.append((
-            *head, f"{run['cost']:.3f}", f"{100.0 * (run['cost'] / base - 1.0):+.1f}", f"{run['below']:.2f}",
-            f"{run['above']:.2f}", f"{run['hours_below']:.1f}", "-" if starts is None else f"{starts:.1f}",
-            f"{run['cpu_seconds']:.0f}" if run["cpu_seconds"] >= 10.0 else f"{run['cpu_seconds']:.1f}",
+            *head, f"{row['cost']:.3f}", f"{100.0 * (row['cost'] / base - 1.0):+.1f}", f"{row['below']:.2f}",
+            f"{row['above']:.2f}", f"{row['hours_below']:.1f}", "-" if starts is None else f"{starts:.1f}",
+            f"{row['cpu_seconds']:.0f}" if row["cpu_seconds"] >= 10.0 else f"{row['cpu_seconds']:.1f}",
         ))  # fmt: skip
     return markdown(COLUMNS, rows)
 
@@ -89,7 +92,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, default=Path("results/foreign_plants"))
     parser.add_argument("--plants", nargs="+", default=list(PLANTS), choices=list(PLANTS))
     parser.add_argument("--periods", nargs="+", default=list(PERIODS), choices=list(PERIODS))
-    parser.add_argument("--controllers", nargs="+", default=list(RULES), choices=list(RULES))
+    parser.add_argument("--controllers", nargs="+", default=list(CONTROLLERS), choices=list(CONTROLLERS))
     parser.add_argument("--publish", action="store_true", help="replace the table between its marks")
     options = parser.parse_args(arguments)
     runs = []

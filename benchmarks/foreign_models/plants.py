@@ -66,13 +66,15 @@ PLANTS = {
 }
 
 
-def describe(name: str) -> dict[str, Any]:
+def describe(name: str, errors: str = "day_ahead") -> dict[str, Any]:
     """Return the ``plant.yaml`` of a plant, in the coldest two weeks.
 
     Parameters
     ----------
     name : str
         One of `PLANTS`.
+    errors : str
+        Of its weather forecasts: ``day_ahead`` or ``none``.
     """
     plant = PLANTS[name]
     weather = weather_path(plant.weather)
@@ -93,11 +95,11 @@ def describe(name: str) -> dict[str, Any]:
         "energy": told["energy"],
         "prices": {"electricity": "dynamic", "currency": "EUR"},
         "series": ["prices.csv"],
-        "forecast": {"hours": 24.0},
+        "forecast": {"hours": 24.0, "errors": errors},
     }  # fmt: skip
 
 
-def write_plant(name: str, out: Path) -> Path:
+def write_plant(name: str, out: Path, errors: str = "day_ahead") -> Path:
     """Write the folder of a plant.
 
     Parameters
@@ -106,13 +108,15 @@ def write_plant(name: str, out: Path) -> Path:
         One of `PLANTS`.
     out : Path
         Where folders of plants are; that of this one is made anew.
+    errors : str
+        Of its weather forecasts: ``day_ahead`` or ``none``.
 
     Returns
     -------
     Path
         The ``plant.yaml``.
     """
-    told, folder = describe(name), out / name
+    told, folder = describe(name, errors), out / name
     folder.mkdir(parents=True, exist_ok=True)
     prices = dynamic_prices(told["location"]["timezone"]).to_csv(index=False)
     _whole(folder / f"{name}.epJSON", json.dumps(PLANTS[name].model(), indent=1))
