@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from _foreign_do_mpc import DoMpcController
 from _foreign_rules import ProportionalIntegral
 from foreign_models.periods import DAYS, starts
 from foreign_models.plants import PLANTS, write_plant
@@ -42,6 +43,7 @@ CONTROLLERS: dict[str, Callable[[PlantStudy, Any], Controller]] = {
     "pi": lambda study, plant: ProportionalIntegral(study.machines(plant)),
     "mpc": lambda study, plant: study.optimal(plant),
     "mpc perfect": lambda study, plant: study.optimal(plant),
+    "do-mpc": lambda study, plant: DoMpcController(study.optimal(plant), plant.forecaster.horizon),
 }
 
 
@@ -71,7 +73,7 @@ def run(name: str, which: str, controller: str, out: Path) -> dict[str, Any]:
     perfect = controller == "mpc perfect"
     folder = out / ("plants_foreseen" if perfect else "plants")
     path = write_plant(name, folder, "none" if perfect else "day_ahead")
-    model, spent = identified(name, out) if controller.startswith("mpc") else (None, {})
+    model, spent = identified(name, out) if "mpc" in controller else (None, {})
     begin = pd.Timestamp(starts(weather_path(PLANTS[name].weather))[which])
     study = PlantStudy(path, start=f"{begin:%Y-%m-%d}", end=f"{begin + pd.Timedelta(days=DAYS):%Y-%m-%d}", model=model)
     with study.plant() as plant:

@@ -9,7 +9,8 @@ the coldest and in a typical period of its place, after a week under its own con
   set-back and a lead of 3 h; *long rule*: with a lead of 6 h;
 - *pi*: a PI to the speed of a machine that has one;
 - *mpc*: the library's, after an experiment of two weeks beside the coldest period (``identify``, then ``control``),
-  with weather forecasts that are wrong as day-ahead ones are; *mpc perfect*: the same with the weather that comes.
+  with weather forecasts that are wrong as day-ahead ones are; *mpc perfect*: the same with the weather that comes;
+- *do-mpc*: as *mpc*, every problem solved by do-mpc (extra ``[benchmarks]``), some ten minutes of CPU a run.
 
 Run: ``python benchmarks/foreign_plants.py --out results/foreign_plants [--publish]`` with the extra ``[energyplus]``.
 What is finished is kept, one file a run, and the same command goes on from there. Writes ``foreign_plants.json`` and
@@ -37,6 +38,7 @@ PERIODS = ("coldest", "typical")
 TITLES = {
     "own": "own control", "rule": "full speed or set-back, lead 3 h", "long rule": "the same, lead 6 h", "pi": "PI",
     "mpc": "MPC, identified", "mpc perfect": "the same, weather known",
+    "do-mpc": "the same, solved by do-mpc",
 }  # fmt: skip
 COLUMNS = ("plant", "period", "controller", "cost, EUR/m²", "against own, %", "below the band, K h a zone",
            "above, K h a zone", "time below, h a zone", "starts a day", "CPU, s")  # fmt: skip

@@ -14,6 +14,10 @@ import pandas as pd
 import pytest
 
 from mpc.adapters.described.load import load_plant
+from mpc.errors import ControlError
+from mpc.identify.machines import Machine
+from mpc.loop.actuators import Actuator
+from mpc.loop.plant import Measurements, PointLayout
 from mpc.loop.run import run_closed_loop
 from mpc.scenario.forecast import Forecast
 from thermal.case.points import HEATING_POWER, ZONE_TEMPERATURE
@@ -95,25 +99,20 @@ def test_a_clock_is_early_and_a_schedule_holds_its_hours(models: Callable[[str],
                       "For: AllOtherDays", "Until: 24:00", 3.0]  # fmt: skip
 
 
-def test_rules_know_the_coming_hours_and_name_what_they_miss(script: Callable[[str], ModuleType]) -> None:
-    from mpc.errors import ControlError
-    from mpc.loop.actuators import HEATING_SETPOINT, Actuator
-    from mpc.loop.plant import Measurements, PointLayout
-
-    rules = script("_foreign_rules")
+def test_a_pi_gives_the_speed_that_the_coming_hours_ask_for(script: Callable[[str], ModuleType]) -> None:
     stamps = pd.date_range("2023-01-09 04:15", periods=24, freq="15min", tz="Etc/GMT+5")
     lower = np.where(stamps > stamps[7], 294.15, 289.15)  # from 6 h on
     forecast = Forecast(pd.DataFrame({"room/comfort_lower_temperature": lower}, index=stamps))
     seen = Measurements(PointLayout((f"room/{ZONE_TEMPERATURE}",), "Etc/GMT+5"), int(stamps[0].timestamp()), [293.0])
-    machine = Actuator("pump/speed", "1", 0.0, 1.0, kind="modulating", minimum=0.25)
-    thermostat = Actuator(f"room/{HEATING_SETPOINT}", "K", 285.0, 298.0)
-    switched = [rules.FullSpeed([machine, thermostat], ["room"], lead=lead).step(seen, forecast) for lead in (1.0, 3.0)]
-    assert switched == [{"pump/speed": 0.0}, {"pump/speed": 1.0}]
-    assert rules.FullSpeed([thermostat], ["room"]).step(seen, forecast) == {thermostat.name: pytest.approx(294.25)}
-    speed = rules.ProportionalIntegral([machine], ["room"], above=0.0, gain=0.5).step(seen, forecast)
-    assert speed == {"pump/speed": pytest.approx(0.5 * 1.15)}
-    with pytest.raises(ControlError, match="expected a command of a machine"):
-        rules.ProportionalIntegral([thermostat], ["room"])
+    speed = Actuator("pump/speed", "1", 0.0, 1.0, kind="modulating", minimum=0.25)
+    machine, pi = Machine(speed, "machine", ("room",)), script("_foreign_rules").ProportionalIntegral
+    told = [pi([machine], lead=lead, above=0.0, gain=gain).step(seen, forecast) for lead, gain in (
+        (1.0, 0.5), (3.0, 0.5), (3.0, 0.15), (3.0, 0.05)
+    )]  # fmt: skip
+    assert [action["pump/speed"] for action in told] == pytest.approx([0.0, 0.5 * 1.15, 0.25, 0.0])
+    thermostat = Machine(Actuator("room/setpoint", "K", 285.0, 298.0), "setpoint", ("room",))
+    with pytest.raises(ControlError, match="expected a machine with a speed, found room/setpoint"):
+        pi([thermostat])
 
 
 @needs_energyplus
@@ -166,7 +165,6 @@ def test_a_run_of_the_table(script: Callable[[str], ModuleType], models: Any, tm
         script(name)
     table, runs = script("foreign_plants"), script("_foreign_runs")
     monkeypatch.setattr(runs, "DAYS", 1)
-    monkeypatch.setattr(runs, "WARM_UP", 1)
     arguments = ["--out", str(tmp_path), "--plants", "house", "--periods", "coldest", "--controllers", "own", "rule"]
     assert table.main(arguments) == 0
     rows = json.loads((tmp_path / "foreign_plants.json").read_text())
