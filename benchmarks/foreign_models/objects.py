@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from datetime import date
 from typing import Any
 
-from energyplus_trials.frame import Objects, frame
+from energyplus_trials.frame import Objects, constant, frame, merge, polygon
 
 #: Value of a command's schedule that leaves the decision to the building's own control.
 OWN = -1.0
@@ -90,31 +90,6 @@ def start(fabric: Fabric) -> Objects:
 
 _MONTHS = ("january", "february", "march", "april", "may", "june", "july", "august", "september", "october",
            "november", "december")  # fmt: skip
-
-
-def merge(objects: Objects, part: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> None:
-    """Add objects, class by class.
-
-    Parameters
-    ----------
-    objects : dict
-        By class and name; changed.
-    part : mapping
-        What to add.
-    """
-    for kind, content in part.items():
-        objects.setdefault(kind, {}).update({name: dict(fields) for name, fields in content.items()})
-
-
-def constant(value: float) -> dict[str, Any]:
-    """Return a schedule that stays at a value unless it is overwritten.
-
-    Parameters
-    ----------
-    value : float
-        Any unit.
-    """
-    return {"schedule_type_limits_name": "any", "hourly_value": value}
 
 
 def daily(weekday: Sequence[float], weekend: Sequence[float]) -> dict[str, Any]:
@@ -206,10 +181,9 @@ _FACING = {"south": "north", "north": "south", "east": "west", "west": "east"}
 
 
 def _face(zone: str, kind: str, corners: list[tuple[float, ...]], other: str | None, side: str) -> dict[str, Any]:
-    names = ("vertex_x_coordinate", "vertex_y_coordinate", "vertex_z_coordinate")
     fields: dict[str, Any] = {
         "surface_type": kind, "zone_name": zone, "construction_name": kind.lower(), "sun_exposure": "NoSun",
-        "wind_exposure": "NoWind", "vertices": [dict(zip(names, corner, strict=True)) for corner in corners],
+        "wind_exposure": "NoWind", **polygon(corners),
     }  # fmt: skip
     if other:
         fields |= {"outside_boundary_condition": "Surface", "construction_name": "partition",
