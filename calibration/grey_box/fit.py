@@ -142,17 +142,20 @@ def follow(box: GreyBox, data: GreyBoxData) -> Followed:
     first = np.nanmean(np.vstack([data.zone[:4], np.nanmean(data.zone, axis=0)]), axis=0) - REFERENCE
     z[: 4 * nz] = np.tile(first, len(NODES))
     matrix, observe = whole.dense(), whole.observation
-    states, errors = np.empty((len(u) + 1, whole.n)), np.empty((len(u), nz))
-    seen = data.zone - REFERENCE
-    for k in range(len(u)):
+    seen = data.zone - REFERENCE - through
+    known = np.isfinite(seen)
+    states, inward = np.empty((len(u) + 1, whole.n)), matrix @ gain
+    # prediction and correction in one: x' = (A - A K C) x + A K y + B u, where all zones are measured
+    closed, given = matrix - inward @ observe, np.where(known, seen, 0.0) @ inward.T
+    given[:, : space.order] += pushed
+    for k, whole_row in enumerate(known.all(axis=1).tolist()):
         states[k] = z
-        error = seen[k] - observe @ z - through[k]
-        errors[k] = error
-        if error[0] != error[0] or np.isnan(error).any():
-            error = np.where(np.isnan(error), 0.0, error)
-        z = matrix @ (z + gain @ error)
-        z[: space.order] += pushed[k]
+        if whole_row:
+            z = closed @ z + given[k]
+        else:
+            z = matrix @ z - inward @ np.where(known[k], observe @ z, 0.0) + given[k]
     states[-1] = z
+    errors = seen - states[:-1] @ observe.T
     judged = errors[min(round(SPIN_UP / data.step), len(errors) // 2) :]
     judged = judged[np.isfinite(judged).all(axis=1)]
     _, determinant = np.linalg.slogdet(innovation)

@@ -239,13 +239,19 @@ class IdentifiedController:
         return max(self._hold - runs.since, 1)
 
     def _starting(self, k: int, on: bool, found: StageSolution, steps: int) -> float:
-        """What starts cost that follow from a choice [currency]."""
+        """What starts cost that follow from a choice [currency].
+
+        A machine that is off and will run later starts once either way. One that has run n steps shares its start among
+        them: another step makes that c / n cheaper, which is what an end of the run forgoes.
+        """
         runs, limit = self._runs[k], self.settings.starts
         price = self.settings.start_price * limit / max(limit - len(runs.starts), 1e-3)
         if on:
             return 0.0 if runs.on else price
         later = float(found.decisions[steps:, k].sum())
-        return price if later > _HALF else 0.0
+        if later <= _HALF:
+            return 0.0
+        return price / max(runs.since, 1) if runs.on else price
 
     def _solve(self, ahead: Ahead, ends: tuple[FloatArray, FloatArray]) -> StageSolution | None:
         """Plan within ends of the decisions; they are then duties and loads themselves."""
