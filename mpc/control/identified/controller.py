@@ -26,8 +26,8 @@ from mpc.scenario.forecast import Forecast
 from thermal._types import FloatArray
 from thermal.case.building import Location
 
-#: A duty above this is a run [-].
-_HALF = 0.5
+#: A duty above this is a run, a load below the other one is none [-].
+_HALF, _IDLE = 0.5, 0.02
 
 
 @dataclass(frozen=True)
@@ -302,7 +302,9 @@ class IdentifiedController:
             served = [k for k, name in enumerate(self.model.box.zones) if name in found.machine.serves]
             idle, full = found.above
             value = float(zone[served].mean()) + REFERENCE + idle + level * (full - idle)
-            return float(np.clip(value if level > 0.02 else min(value, float(ahead.lower[0, served].min())), low, high))
+            # a thermostat holds what it is told: told the edge it keeps the band where the model is wrong, at no other cost
+            edge = float(ahead.lower[0, served].max()) + max(self.back_off, 0.0)
+            return float(np.clip(edge if level <= _IDLE else max(value, edge), low, high))
         if found.operation == "duty":
             return high if level > _HALF else low
         value = low + level * (high - low)
