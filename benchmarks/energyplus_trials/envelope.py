@@ -6,6 +6,7 @@ import numpy as np
 
 from energyplus_trials import fabric, model, plan, profiles
 from energyplus_trials.errors import TrialError
+from energyplus_trials.frame import merge, polygon
 from energyplus_trials.plant import Plant
 from energyplus_trials.specification import Effect
 
@@ -32,7 +33,7 @@ def _horizon(plant: Plant, azimuth: float, elevation: float) -> None:
     along = half * np.array([np.cos(to), -np.sin(to)])
     (x0, y0), (x1, y1) = middle - along, middle + along
     ring = [(x0, y0, height), (x0, y0, 0.0), (x1, y1, 0.0), (x1, y1, height)]
-    plant.add("Shading:Site:Detailed", "horizon", **model.polygon([tuple(map(float, p)) for p in ring]))
+    plant.add("Shading:Site:Detailed", "horizon", **polygon([tuple(map(float, p)) for p in ring]))
 
 
 def blinds(plant: Plant, effect: Effect) -> None:
@@ -67,7 +68,7 @@ def solar_opaque(plant: Plant, effect: Effect) -> None:
     plant.sun = True
     layers = fabric.constructions(plant.spec.fabric)
     wall = fabric.objects({"exterior wall": layers["exterior wall"]}, effect.parameters["absorptance"])
-    model.merge(plant.objects, wall)
+    merge(plant.objects, wall)
 
 
 def longwave_sky(plant: Plant, effect: Effect) -> None:
@@ -96,7 +97,7 @@ def interfloor(plant: Plant, effect: Effect) -> None:
     rest = 0.27 + 2.0 * concrete / fabric.SOLIDS["concrete"][0]
     between = max(1.0 / effect.parameters["u_value_W_m2_K"] - rest, 0.01)
     layers: fabric.Layers = [("concrete", concrete), ("", round(between, 4)), ("concrete", concrete)]
-    model.merge(plant.objects, fabric.objects({"floor between": layers}, fabric.NO_SOLAR_ABSORPTANCE))
+    merge(plant.objects, fabric.objects({"floor between": layers}, fabric.NO_SOLAR_ABSORPTANCE))
     surfaces = plant.objects["BuildingSurface:Detailed"]
     for zone in plant.spec.zone_names:
         floor, name = model.split(zone)
@@ -115,7 +116,7 @@ def ground(plant: Plant, effect: Effect) -> None:
     concrete = plant.spec.fabric.slab
     between = 1.0 / effect.parameters["u_value_W_m2_K"] - 0.17 - concrete / fabric.SOLIDS["concrete"][0]
     layers: fabric.Layers = [("", round(max(between, 0.01), 4)), ("concrete", concrete)]
-    model.merge(plant.objects, fabric.objects({"floor on ground": layers}, fabric.NO_SOLAR_ABSORPTANCE))
+    merge(plant.objects, fabric.objects({"floor on ground": layers}, fabric.NO_SOLAR_ABSORPTANCE))
     temperature = profiles.ground_temperature(plant.spec.climate, plant.starts) + effect.parameters["warmer_K"]
     other_side(plant, "ground", plant.add_schedule("ground", temperature), film=0.0)
     for zone in plant.spec.zone_names:
@@ -153,7 +154,7 @@ def roof(plant: Plant, effect: Effect) -> None:
     layers: fabric.Layers = [("render", 0.01), ("", round(max(between, 0.01), 4)), ("concrete", concrete)]
     opaque = [e.parameters["absorptance"] for e in plant.spec.effects if e.name == "solar_opaque"]
     absorptance = opaque[0] if opaque else fabric.NO_SOLAR_ABSORPTANCE
-    model.merge(plant.objects, fabric.objects({"roof": layers}, absorptance))
+    merge(plant.objects, fabric.objects({"roof": layers}, absorptance))
     for zone in plant.spec.zone_names:
         if model.split(zone)[0] == plant.spec.layout.floors - 1:
             plant.objects["BuildingSurface:Detailed"][f"{zone} ceiling"] |= {
@@ -166,7 +167,7 @@ def thermal_bridge(plant: Plant, effect: Effect) -> None:
     """Give each exterior wall a strip without mass at its foot, of the wall's U-value and the bridge's."""
     u_value = plant.spec.fabric.wall_u_value + effect.parameters["psi_W_m_K"] / STRIP
     layers: fabric.Layers = [("", round(max(1.0 / u_value - fabric.FILMS, 0.01), 4))]
-    model.merge(plant.objects, fabric.objects({"bridge": layers}, fabric.NO_SOLAR_ABSORPTANCE))
+    merge(plant.objects, fabric.objects({"bridge": layers}, fabric.NO_SOLAR_ABSORPTANCE))
     for zone in plant.spec.zone_names:
         for s in plan.segments(plant.spec.layout.zones):
             if s.other is None and s.zone == model.split(zone)[1]:
@@ -182,7 +183,7 @@ def neighbour(plant: Plant, effect: Effect) -> None:
     brick = 0.15
     between = 1.0 / effect.parameters["u_value_W_m2_K"] - 0.26 - 2.0 * brick / fabric.SOLIDS["brick"][0]
     layers: fabric.Layers = [("brick", brick), ("", round(max(between, 0.01), 4)), ("brick", brick)]
-    model.merge(plant.objects, fabric.objects({"party wall": layers}, fabric.NO_SOLAR_ABSORPTANCE))
+    merge(plant.objects, fabric.objects({"party wall": layers}, fabric.NO_SOLAR_ABSORPTANCE))
     schedule = plant.add_schedule("next door", effect.parameters["temperature_degC"])
     other_side(plant, "next door", schedule, PARTY_WALL_FILM)
     for zone in effect.zones:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from datetime import date
 from typing import Any
 
@@ -62,3 +63,40 @@ def frame(run_period: str, first: date, last: date) -> Objects:
             }
         },
     }
+
+
+def merge(objects: Objects, part: Objects) -> None:
+    """Add objects, class by class.
+
+    Parameters
+    ----------
+    objects : dict
+        By class and name; changed.
+    part : dict
+        What to add.
+    """
+    for kind, content in part.items():
+        objects.setdefault(kind, {}).update(content)
+
+
+def constant(value: float) -> dict[str, Any]:
+    """Return a schedule that stays at a value unless the run drives it.
+
+    Parameters
+    ----------
+    value : float
+        Any unit.
+    """
+    return {"schedule_type_limits_name": "any", "hourly_value": value}
+
+
+def polygon(points: Sequence[Sequence[float]]) -> dict[str, Any]:
+    """Return the vertices of a surface.
+
+    Parameters
+    ----------
+    points : sequence of (x, y, z)
+        Corners [m].
+    """
+    names = ("vertex_x_coordinate", "vertex_y_coordinate", "vertex_z_coordinate")
+    return {"vertices": [dict(zip(names, point, strict=True)) for point in points]}

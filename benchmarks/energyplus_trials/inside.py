@@ -8,6 +8,7 @@ import numpy as np
 
 from energyplus_trials import fabric, model, profiles
 from energyplus_trials.draw_effects import outer_zones
+from energyplus_trials.frame import merge
 from energyplus_trials.plant import Plant
 from energyplus_trials.specification import Effect
 
@@ -62,7 +63,7 @@ def internal_gains(plant: Plant, effect: Effect) -> None:
 def hidden_mass(plant: Plant, effect: Effect) -> None:
     """Stand concrete in the rooms."""
     layers: fabric.Layers = [("concrete", HIDDEN_MASS_THICKNESS)]
-    model.merge(plant.objects, fabric.objects({"hidden mass": layers}, fabric.NO_SOLAR_ABSORPTANCE))
+    merge(plant.objects, fabric.objects({"hidden mass": layers}, fabric.NO_SOLAR_ABSORPTANCE))
     _, density, capacity = fabric.SOLIDS["concrete"]
     of_a_face = HIDDEN_MASS_THICKNESS / 2.0 * density * capacity / 1000.0  # [kJ/m2/K]
     for zone in plant.spec.zone_names:

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from energyplus_trials import fabric, plan, terminals
-from energyplus_trials.frame import Objects, frame
+from energyplus_trials.frame import Objects, constant, frame, merge, polygon
 from energyplus_trials.specification import TrialSpec, stream_generator
 
 #: Spread of the furniture of zones in uneven offices, and the purpose of its random numbers.
@@ -40,26 +40,12 @@ def null_model(spec: TrialSpec, first: pd.Timestamp, last: pd.Timestamp) -> Obje
         {"WindowMaterial:Glazing": {"glass": fabric.pane(spec.fabric.window_u_value, 0.0)}},
         {"Construction": {"window": {"outside_layer": "glass"}}},
         _surfaces(spec),
-        {"Schedule:Constant": {terminals.DUAL_SETPOINT: terminals.constant(4.0)}, "ScheduleTypeLimits": {"any": {}}},
+        {"Schedule:Constant": {terminals.DUAL_SETPOINT: constant(4.0)}, "ScheduleTypeLimits": {"any": {}}},
         *(terminals.terminal(zone, spec.use.flow * area(spec, zone)) for zone in spec.zone_names),
     )
     for part in parts:
         merge(objects, part)
     return objects
-
-
-def merge(objects: Objects, part: Objects) -> None:
-    """Add objects, class by class.
-
-    Parameters
-    ----------
-    objects : dict
-        By class and name; changed.
-    part : dict
-        What to add.
-    """
-    for kind, content in part.items():
-        objects.setdefault(kind, {}).update(content)
 
 
 def split(zone: str) -> tuple[int, str]:
@@ -182,18 +168,6 @@ def _constant_films(spec: TrialSpec) -> Objects:
             for kind in ("AllExteriorWalls", "AllExteriorWindows", "AllExteriorRoofs")
         },
     }
-
-
-def polygon(points: list[tuple[float, float, float]]) -> dict[str, Any]:
-    """Return the vertices of a surface.
-
-    Parameters
-    ----------
-    points : list of (x, y, z)
-        Corners [m].
-    """
-    names = ("vertex_x_coordinate", "vertex_y_coordinate", "vertex_z_coordinate")
-    return {"vertices": [dict(zip(names, point, strict=True)) for point in points]}
 
 
 def _surfaces(spec: TrialSpec) -> Objects:

@@ -17,9 +17,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from energyplus_trials import climate, model, terminals
+from energyplus_trials import climate, model
 from energyplus_trials.errors import EnergyPlusMissingError, EnergyPlusRunError
-from energyplus_trials.frame import SITE_OUTPUTS, Objects
+from energyplus_trials.frame import SITE_OUTPUTS, Objects, constant
 from energyplus_trials.specification import TrialSpec
 
 RUN_IN_DAYS = 10
@@ -91,7 +91,7 @@ class Plant:
             Its values.
         """
         series = np.broadcast_to(np.asarray(values, dtype=float), (len(self.station),))
-        self.add("Schedule:Constant", name, **terminals.constant(float(series[0])))
+        self.add("Schedule:Constant", name, **constant(float(series[0])))
         if np.ptp(series) > 0.0:
             self.drive[name] = series
         return name

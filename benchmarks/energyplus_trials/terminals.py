@@ -2,25 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from energyplus_trials.frame import Objects
+from energyplus_trials.frame import Objects, constant
 
 HEATING_SUPPLY, COOLING_SUPPLY = 35.0, 14.0  # [degC]
 # So dry that EnergyPlus's cp of air (1004.84 + 1858.95 w) is the case format's 1006 J/kg/K; no moisture anywhere else.
 SUPPLY_HUMIDITY_RATIO = 0.000624  # [kg/kg]
 DUAL_SETPOINT = "dual setpoint"  # schedule of the kind of thermostat
-
-
-def constant(value: float) -> dict[str, Any]:
-    """Return a schedule that stays at a value unless the run drives it.
-
-    Parameters
-    ----------
-    value : float
-        Any unit.
-    """
-    return {"schedule_type_limits_name": "any", "hourly_value": value}
 
 
 def terminal(zone: str, flow: float) -> Objects:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from energyplus_trials.frame import merge, polygon
 from energyplus_trials.specification import Effect
 
 from house_trials import fabric, model, people
@@ -39,7 +40,7 @@ def _solar_gain(plant: Plant, effect: Effect) -> None:
 
 def _solar_opaque(plant: Plant, effect: Effect) -> None:
     plant.sun = True
-    model.merge(plant.objects, model.materials(plant.spec, effect.parameters["absorptance"]))
+    merge(plant.objects, model.materials(plant.spec, effect.parameters["absorptance"]))
 
 
 def _longwave_sky(plant: Plant, effect: Effect) -> None:
@@ -108,7 +109,7 @@ def _internal_gains(plant: Plant, effect: Effect) -> None:
 
 def _ground(plant: Plant, effect: Effect) -> None:
     """Let soil take the place of the adiabatic back of the lowest floors."""
-    model.merge(plant.objects, model.other_side("soil", effect.parameters["u_value_W_m2_K"]))
+    merge(plant.objects, model.other_side("soil", effect.parameters["u_value_W_m2_K"]))
     plant.follow("soil", np.full(len(plant.station), effect.parameters["temperature_degC"]))
     for face in faces(plant.spec.house):
         if face.other == "ground":
@@ -117,7 +118,7 @@ def _ground(plant: Plant, effect: Effect) -> None:
 
 
 def _hidden_mass(plant: Plant, effect: Effect) -> None:
-    model.merge(plant.objects, model.materials(plant.spec, _absorptance(plant), {"masonry": (("brick", _MASONRY),)}))
+    merge(plant.objects, model.materials(plant.spec, _absorptance(plant), {"masonry": (("brick", _MASONRY),)}))
     _, density, capacity = fabric.MATERIALS["brick"]
     of_a_face = _MASONRY / 2.0 * density * capacity / 1000.0  # [kJ/m2/K]
     for room in plant.spec.house.rooms:
@@ -169,7 +170,7 @@ def _thermal_bridge(plant: Plant, effect: Effect) -> None:
             plant.add(
                 "BuildingSurface:Detailed", f"{face.name} edge", surface_type="Wall", construction_name="edge",
                 zone_name=face.room, outside_boundary_condition="Outdoors", sun_exposure="SunExposed",
-                wind_exposure="WindExposed", **model.polygon(upright(start, end, low, low + min(_STRIP, STRUCTURE))),
+                wind_exposure="WindExposed", **polygon(upright(start, end, low, low + min(_STRIP, STRUCTURE))),
             )  # fmt: skip
 
 
@@ -179,8 +180,8 @@ def _neighbour(plant: Plant, effect: Effect) -> None:
     between = 1.0 / effect.parameters["u_value_W_m2_K"] - 0.26 - 2.0 * brick / fabric.MATERIALS["brick"][0]
     wool = round(max(between, 0.01) * fabric.MATERIALS["wool"][0], 4)
     party = (("brick", brick), ("wool", wool), ("brick", brick))
-    model.merge(plant.objects, model.materials(plant.spec, _absorptance(plant), {"party wall": party}))
-    model.merge(plant.objects, model.other_side("next door", _PARTY_FILM))
+    merge(plant.objects, model.materials(plant.spec, _absorptance(plant), {"party wall": party}))
+    merge(plant.objects, model.other_side("next door", _PARTY_FILM))
     plant.follow("next door", np.full(len(plant.station), effect.parameters["temperature_degC"]))
     surfaces = plant.objects["BuildingSurface:Detailed"]
     for face in faces(plant.spec.house):

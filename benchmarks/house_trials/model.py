@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import pandas as pd
-from energyplus_trials.frame import Objects, frame
+from energyplus_trials.frame import Objects, constant, frame, merge, polygon
 
 from house_trials import fabric
 from house_trials.draw_effects import heated
-from house_trials.faces import DOORWAY_AREA, Face, Point, faces, partner
+from house_trials.faces import DOORWAY_AREA, Face, faces, partner
 from house_trials.specification import HouseSpec
 
 DARK = 0.001  # [-], solar absorptance of a surface that the sun does not warm; EnergyPlus wants more than 0
@@ -38,31 +38,6 @@ def null_model(spec: HouseSpec, first: pd.Timestamp, last: pd.Timestamp) -> Obje
     for room in heated(spec):
         merge(objects, _floor_heater(spec, room) if on_floor(spec, room) else _radiator(spec, room))
     return {kind: content for kind, content in objects.items() if content}
-
-
-def merge(objects: Objects, part: Objects) -> None:
-    """Add objects, class by class.
-
-    Parameters
-    ----------
-    objects : dict
-        By class and name; changed.
-    part : dict
-        What to add.
-    """
-    for kind, content in part.items():
-        objects.setdefault(kind, {}).update(content)
-
-
-def constant(value: float) -> dict[str, Any]:
-    """Return a schedule that stays at a value unless the run drives it.
-
-    Parameters
-    ----------
-    value : float
-        Any unit.
-    """
-    return {"schedule_type_limits_name": "any", "hourly_value": value}
 
 
 def on_floor(spec: HouseSpec, room: str) -> bool:
@@ -228,18 +203,6 @@ def mixing(rooms: tuple[str, ...], flow: float, schedule: str) -> dict[str, Any]
         "zone_or_space_name": rooms[0], "source_zone_or_space_name": rooms[1], "schedule_name": schedule,
         "design_flow_rate_calculation_method": "Flow/Zone", "design_flow_rate": flow, "delta_temperature": 0.0,
     }  # fmt: skip
-
-
-def polygon(points: tuple[Point, ...]) -> dict[str, Any]:
-    """Return the vertices of a surface.
-
-    Parameters
-    ----------
-    points : tuple of Point
-        Corners [m].
-    """
-    names = ("vertex_x_coordinate", "vertex_y_coordinate", "vertex_z_coordinate")
-    return {"vertices": [dict(zip(names, point, strict=True)) for point in points]}
 
 
 def _surface(spec: HouseSpec, face: Face) -> dict[str, Any]:

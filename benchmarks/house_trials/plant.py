@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 from energyplus_trials import climate
 from energyplus_trials.errors import EnergyPlusMissingError, EnergyPlusRunError
-from energyplus_trials.frame import SITE_OUTPUTS, Objects
+from energyplus_trials.frame import SITE_OUTPUTS, Objects, constant
 
 from house_trials import model
 from house_trials.draw_effects import heated
@@ -109,7 +109,7 @@ class Plant:
         values : ndarray, shape (n_time,)
             Its values.
         """
-        self.objects.setdefault("Schedule:Constant", {})[name] = model.constant(float(values[0]))
+        self.objects.setdefault("Schedule:Constant", {})[name] = constant(float(values[0]))
         self.drive[name] = np.asarray(values, dtype=float)
         return name
 

@@ -20,6 +20,7 @@ from mpc.cli.doctor import doctor
 from mpc.cli.effects import effects
 from mpc.cli.evaluate import check, evaluate, simulate
 from mpc.cli.experiment import experiment
+from mpc.cli.identify import identify
 from mpc.cli.imports import import_devices, import_plan, import_telemetry
 from mpc.cli.monitor import monitor
 from mpc.cli.options import displaying, switch, value
@@ -117,7 +118,7 @@ _REPORTING = (demo, check, simulate, evaluate, calibrate, diagnose, experiment, 
 
 for _command in (
     *(demo, doctor, check, import_plan, import_devices, import_telemetry, label),
-    *(simulate, evaluate, calibrate, diagnose, experiment, monitor, effects, control, compare, serve),
+    *(simulate, evaluate, calibrate, diagnose, experiment, monitor, effects, identify, control, compare, serve),
 ):
     app.command()(_guarded(displaying(_command) if _command in _REPORTING else _command))
 

@@ -4,29 +4,46 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+import typer
+
 from mpc.cli.console import Waiting, answer, complain, say, show_table
 from mpc.cli.doctor import missing_extras
-from mpc.cli.options import CaseFolder, Dx, Force, Json, Parameters, Start, file, folder, spread, switch, value
+from mpc.cli.options import Dx, Force, Json, Parameters, file, folder, ids, share, spread, switch, value
 
 if TYPE_CHECKING:
     from mpc.studies.demo import Demo
+    from mpc.studies.described import PlantStudy
     from mpc.studies.run import ControlRun
     from mpc.studies.study import Study
 
 OUT = Path("buildingmpc_demo")
+
+_OF_CASES, _OF_PLANTS = "schedule,reset,guideline36,mpc,bound", "own,full_speed,mpc"
 
 
 @dataclass(frozen=True)
 class StudyOptions:
     """Options that both commands have: what is controlled."""
 
-    case: CaseFolder
-    start: Start
-    end: Annotated[str, value("End; the telemetry must hold the weather until then, if no --weather is given.", "T")]
+    case: Annotated[Path, typer.Argument(metavar="CASE", help="Case folder, plant.yaml, or name of a ready plant.")]
+    start: Annotated[
+        str | None, value("Start, ISO 8601, local; of a plant.yaml by default that of its period.", "T")
+    ] = None
+    end: Annotated[
+        str | None, value("End; the telemetry of a case must hold the weather until then, if no --weather is given.", "T")
+    ] = None
+    model: Annotated[
+        Path | None, value("Folder that `buildingmpc identify` wrote, for optimal control of a plant.yaml.", "DIR")
+    ] = None
+    at: Annotated[str | None, value("Unit or server in the place of that of a plant.yaml.", "FILE|URL")] = None
+    violations: Annotated[
+        str | None, value("Share of occupied steps below the band that is allowed, such as 5%; of a plant.yaml.", "P")
+    ] = None
+    starts: Annotated[int, value("Most starts of a machine in 24 hours; of a plant.yaml.")] = 10
     parameters: Parameters = None
     controller_parameters: Annotated[
         Path | None,
@@ -35,8 +52,9 @@ class StudyOptions:
     plant: Annotated[str, value("How the plant's building steps: reduced, grid, random.", "KIND")] = "reduced"
     dx: Dx = None
     comfort_price: Annotated[
-        float, value("Of a zone's kelvin outside of its band for an hour, for optimal control.", "PRICE")
-    ] = 1.0
+        float | None,
+        value("Of a zone's kelvin outside of its band for an hour, for optimal control; default: 1, of a plant 10.", "PRICE"),
+    ] = None
     weather: Annotated[
         Path | None, file("EPW: a typical year in place of the weather that was measured with the case.")
     ] = None
@@ -59,8 +77,33 @@ class StudyOptions:
     force: Force = False
     json: Json = False
 
-    def study(self) -> Study:
+    @property
+    def described(self) -> bool:
+        """Whether a described plant is controlled, rather than the building of a case."""
+        from mpc.adapters.described.load import ready_plants
+
+        return self.case.suffix in (".yaml", ".yml") or (str(self.case) in ready_plants() and not self.case.exists())
+
+    def study(self) -> Study | PlantStudy:
         """Put together what controllers run on."""
+        return self._described() if self.described else self._case()
+
+    def _described(self) -> PlantStudy:
+        from mpc.control.identified.conformal import Guarantee
+        from mpc.control.identified.controller import IdentifiedSettings
+        from mpc.identify.model import read_model
+        from mpc.studies.described import PlantStudy
+
+        guarantee = None if self.violations is None else Guarantee(share(self.violations, "--violations"))
+        settings = IdentifiedSettings(starts=self.starts, guarantee=guarantee)
+        if self.comfort_price is not None:
+            settings = replace(settings, comfort_price=self.comfort_price)
+        model = None if self.model is None else read_model(self.model)
+        return PlantStudy(self.case, self.at, self.start, self.end, model, settings)
+
+    def _case(self) -> Study:
+        from mpc.errors import ControlError
+        from mpc.kpi.rewards import DISCOMFORT_PRICE
         from mpc.loop.noise import SensorNoise
         from mpc.scenario.forecast import DAY_AHEAD_ERRORS
         from mpc.scenario.from_text import read_comfort, read_tariff
@@ -68,12 +111,14 @@ class StudyOptions:
         from mpc.studies.study import StudySettings, make_study
         from thermal.case.load import load_case
 
+        if self.start is None or self.end is None:
+            raise ControlError("control of a case", "--start and --end", f"{self.start} and {self.end}")
         settings = StudySettings(
             parameters=self.parameters, controller_parameters=self.controller_parameters, dx=self.dx,
             kind=self.plant, tariff=read_tariff(self.tariff, self.gas_price, self.currency),  # type: ignore[arg-type]
             comfort=None if self.comfort is None else read_comfort(self.comfort),
             noise=None if self.exact else SensorNoise(), errors={} if self.exact else DAY_AHEAD_ERRORS,
-            comfort_price=self.comfort_price, seed=self.seed,
+            comfort_price=DISCOMFORT_PRICE if self.comfort_price is None else self.comfort_price, seed=self.seed,
         )  # fmt: skip
         case = load_case(self.case)
         weather = weather_of_case(case) if self.weather is None else read_epw(self.weather)
@@ -85,13 +130,17 @@ def control(
     given: StudyOptions,
     out: Annotated[Path, folder("control.json, trajectory.parquet, report.html")],
     controller: Annotated[
-        str, value("mpc, schedule, reset, guideline36, bound (perfect knowledge), or one of a plugin.", "NAME")
+        str,
+        value(
+            "mpc, schedule, reset, guideline36, bound (perfect knowledge), of a plant.yaml mpc, full_speed or own, or one "
+            "of a plugin.", "NAME",
+        ),
     ] = "mpc",
 ) -> int:
     """Run a building in closed loop with optimal control, or with a rule.
 
     Example: buildingmpc control cases/office --parameters results/calibration.json --start 2023-10-16
-    --end 2023-10-18 --out control
+    --end 2023-10-18 --out control; or of a described plant: buildingmpc control plant.yaml --model model --out control
     """
     from calibration.results import check_results_folder
     from mpc.reports.control import control_summary, control_verdict, write_control
@@ -99,7 +148,7 @@ def control(
     from mpc.studies.run import run_controller
 
     check_results_folder(out, given.force)
-    find_controller(controller)
+    find_controller(controller, "plant" if given.described else "case")
     study = given.study()
     with Waiting(f"control {given.case.name}") as progress:
         run = run_controller(study, controller, progress)
@@ -107,7 +156,7 @@ def control(
 
     def show() -> None:
         say(control_verdict(run))
-        _show_assumed(study)
+        _show_assumed(run)
 
     answer(given.json, control_summary(run), show, report)
     return _exit_code([run])
@@ -118,8 +167,12 @@ def compare(
     given: StudyOptions,
     out: Annotated[Path, folder("comparison.json, a trajectory_NAME.parquet a controller, report.html")],
     controllers: Annotated[
-        str, value("Among schedule, reset, guideline36, mpc, bound, those of plugins.", "A,B,...")
-    ] = "schedule,reset,guideline36,mpc,bound",
+        str | None,
+        value(
+            "Among schedule, reset, guideline36, mpc, bound, of a plant.yaml own, full_speed, mpc, those of plugins; "
+            "default: all of these.", "A,B,...",
+        ),
+    ] = None,
 ) -> int:
     """Run a building with several controllers on the same weather, people and prices, and compare them.
 
@@ -138,9 +191,9 @@ def compare(
     from mpc.studies.run import compare_controllers
 
     check_results_folder(out, given.force)
-    names = [name.strip() for name in controllers.split(",") if name.strip()]
+    names = ids(controllers or (_OF_PLANTS if given.described else _OF_CASES))
     for name in names:
-        find_controller(name)
+        find_controller(name, "plant" if given.described else "case")
     study = given.study()
     with Waiting(f"compare controllers on {given.case.name}") as progress:
         found = compare_controllers(study, names, progress)
@@ -148,9 +201,9 @@ def compare(
 
     def show() -> None:
         say(comparison_verdict(found))
-        name, *numbers = comparison_columns(study.scenario.currency)
+        name, *numbers = comparison_columns(found.study.scenario.currency)
         show_table("Controllers", {name: "", **dict.fromkeys(numbers, "g")}, comparison_rows(found))
-        _show_assumed(study)
+        _show_assumed(found.runs[0])
 
     answer(given.json, comparison_summary(found), show, report)
     return _exit_code(found.runs)
@@ -161,11 +214,11 @@ def _command() -> str:
     return " ".join(["buildingmpc", *sys.argv[1:]])
 
 
-def _show_assumed(study: Study) -> None:
+def _show_assumed(run: ControlRun) -> None:
     from mpc.reports.assumptions import assumption_rows
 
-    show_table("What these costs rest on", {"assumption": "", "value": ""}, assumption_rows(study))
-    for note in study.notes:
+    show_table("What these costs rest on", {"assumption": "", "value": ""}, assumption_rows(run.study))
+    for note in run.study.notes:
         say(f"Assumed: {note}.")
 
 

@@ -180,6 +180,29 @@ def ids(text: str) -> list[str]:
     return [name.strip() for name in text.split(",") if name.strip()]
 
 
+def share(text: str, where: str) -> float:
+    """Read a share, such as 5% or 0.05 [-].
+
+    Parameters
+    ----------
+    text : str
+        As it was given.
+    where : str
+        Name of the option.
+
+    Raises
+    ------
+    MpcError
+        When it is none.
+    """
+    from mpc.errors import MpcError
+
+    try:
+        return float(text.strip().removesuffix("%")) / (100.0 if text.strip().endswith("%") else 1.0)
+    except ValueError as error:
+        raise MpcError(where, "a share such as 5% or 0.05", repr(text)) from error
+
+
 def spread(command: Callable[..., int]) -> Callable[..., int]:
     """Make options of the fields of a command's first argument, a dataclass.
 

@@ -4,6 +4,7 @@ import numpy as np
 
 from mpc.reports.page import counted, significant
 from mpc.scenario.occupancy import ComfortBand, Occupancy, ScheduledOccupancy
+from mpc.studies.described import SeenStudy
 from mpc.studies.study import Study
 from thermal._types import FloatArray
 
@@ -16,14 +17,35 @@ _PLANTS = {
 }
 
 
-def assumption_rows(study: Study) -> list[tuple[str, str]]:
+def assumption_rows(study: Study | SeenStudy) -> list[tuple[str, str]]:
     """Rows of the table of what was assumed, each with its value in words.
 
     Parameters
     ----------
-    study : Study
+    study : Study or SeenStudy
         What controllers ran on.
     """
+    return _of_plant(study) if isinstance(study, SeenStudy) else _of_case(study)
+
+
+def _of_plant(study: SeenStudy) -> list[tuple[str, str]]:
+    """Of a described plant: its description says all, and each edge of a band by the hour."""
+    scenario, n = study.scenario, study.steps
+    currency = scenario.currency
+    bands = [f"{_span(edge[:n] - _CELSIUS)} °C" for edge in (scenario.lower, scenario.upper)]
+    rows = [
+        ("plant", f"Simulated, not a real building: {study.setup}."),
+        ("electricity price", f"{listed_prices(scenario.electricity_price[:n], currency)} per kWh"),
+        ("gas price", f"{listed_prices(scenario.gas_price[:n], currency)} per kWh of upper heating value"),
+        ("currency", f"{currency}, as the description has it; nothing is converted"),
+        ("comfort band", f"lower edge {bands[0]}, upper edge {bands[1]}, by the hour as described"),
+        ("price of discomfort", f"{study.comfort_price:g} {currency} for a zone's kelvin outside of its band for an "
+         "hour: what optimal control weighs energy against; it is on no bill"),
+    ]  # fmt: skip
+    return rows
+
+
+def _of_case(study: Study) -> list[tuple[str, str]]:
     scenario, given, n = study.scenario, study.settings, study.steps
     currency, heat = scenario.currency, scenario.heat
     sensors = "with noise" if given.noise is not None else "exact"

@@ -16,12 +16,10 @@ from mpc.reports.figures.control import cost_bars, course, expectations, side_by
 from mpc.reports.figures.style import CELSIUS
 from mpc.reports.means import NOTICED, comparison_means, control_means
 from mpc.reports.page import duration, percent, significant, spell, write_report
+from mpc.studies.described import RecordedPlant
 from mpc.studies.run import Comparison, ControlRun, prediction_errors
 from thermal.case.points import POINT_TYPES, split_column
 from thermal.units import QUANTITIES, from_si
-
-#: Length of a prediction of optimal control [h].
-_HOURS = 12.0
 
 _CHANGING = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d|\b\d+(\.\d+)?\b")  # times and numbers within a reason
 
@@ -118,7 +116,9 @@ def _section(run: ControlRun, shown: bool) -> dict[str, Any]:
     return {
         "name": run.entry.title.capitalize(),
         "shown": shown,
-        "how": run.entry.about.format(step=round(run.plant.control_step / 60.0), hours=_HOURS),
+        "how": run.entry.about.format(
+            step=round(run.plant.control_step / 60.0), hours=run.study.hours, decided=run.study.decided
+        ),
         "course": course(run),
         "expectations": expectations(run) if shown else [],
         "errors": prediction_errors(run),
@@ -137,14 +137,14 @@ def control_summary(run: ControlRun) -> dict[str, Any]:
     run : ControlRun
         Of `run_controller`.
     """
-    study, chosen, times = run.study, run.study.settings, [d.seconds for d in run.decisions]
+    study, times = run.study, [d.seconds for d in run.decisions]
     return {
         "controller": run.controller,
         "start": study.scenario.grid.start.isoformat(),
         "end": study.stamps[-1].isoformat(),
         "cost": run.cost,
         "cost_with_discomfort": run.objective,
-        "comfort_price": study.settings.comfort_price,
+        "comfort_price": study.comfort_price,
         "kpis": run.kpis.to_dict(),
         "actions": {"count": len(run.loop.actions), "sources": dict(run.sources),
                     "statuses": dict(Counter(d.status for d in run.decisions if d.status)),
@@ -152,10 +152,8 @@ def control_summary(run: ControlRun) -> dict[str, Any]:
         "prediction": prediction_errors(run),
         "reasons": [{"first": row.first.isoformat(), "last": row.last.isoformat(), "count": row.times,
                      "reason": row.reason} for row in reason_rows(run)],
-        "plant": {"building": chosen.kind, "step_seconds": study.scenario.grid.step, "noise": chosen.noise is not None,
-                  "control_step_seconds": run.plant.control_step, "effects": list(study.built.effects)},
-        "forecast": "with errors" if chosen.errors else "perfect",
-        "notes": list(study.notes), "case": study.name, "version": version("buildingmpc"), "seed": chosen.seed,
+        "plant": {**study.facts, "control_step_seconds": run.plant.control_step}, "forecast": study.forecast,
+        "notes": list(study.notes), "case": study.name, "version": version("buildingmpc"), "seed": study.seed,
     }  # fmt: skip
 
 
@@ -175,7 +173,7 @@ def comparison_summary(comparison: Comparison) -> dict[str, Any]:
             for run in comparison.runs
         },
         "best_rule": None if best is None else best.controller,
-        "case": comparison.study.name, "version": version("buildingmpc"), "seed": comparison.study.settings.seed,
+        "case": comparison.study.name, "version": version("buildingmpc"), "seed": comparison.study.seed,
     }  # fmt: skip
 
 
@@ -202,6 +200,8 @@ def trajectory(run: ControlRun) -> pd.DataFrame:
         columns[f"{zone}/comfort_lower_temperature"] = scenario.lower[:n, k] - CELSIUS
         columns[f"{zone}/comfort_upper_temperature"] = scenario.upper[:n, k] - CELSIUS
         columns[f"true/{zone}"] = record.zone_temperature[1:, k] - CELSIUS
+    if isinstance(run.plant, RecordedPlant):  # with what was set and bought, `buildingmpc identify` can begin with it
+        columns |= {name: values.to_numpy() for name, values in run.plant.seen.to_frame().items() if name not in columns}
     columns["electricity_price"], columns["gas_price"] = scenario.electricity_price[:n], scenario.gas_price[:n]
     columns["true/electricity"] = record.electricity
     columns["true/gas"] = np.zeros(n) if record.gas is None else record.gas
@@ -308,7 +308,7 @@ def comparison_verdict(comparison: Comparison) -> str:
     way = comparison.way_to_bound(mpc)
     if way is not None:
         parts.append(
-            f"Counting discomfort at {comparison.study.settings.comfort_price:g} {mpc.kpis.currency} a kelvin hour and "
+            f"Counting discomfort at {comparison.study.comfort_price:g} {mpc.kpis.currency} a kelvin hour and "
             f"zone, that is {percent(way)} of the perfect-forecast savings."
         )
     return " ".join(parts)

@@ -2,12 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, Literal
 
 import numpy as np
 
 from calibration.estimation.disturbance import DisturbanceModel
 from calibration.estimation.kalman import KalmanFilter
 from mpc.baselines.guideline36 import Guideline36
+from mpc.baselines.plants import OwnControl
 from mpc.baselines.rules import OutdoorReset, day_schedule
 from mpc.control.controller.observer import Observer
 from mpc.errors import ControlError
@@ -15,6 +17,7 @@ from mpc.loop.actuators import Actuator
 from mpc.loop.plant import Controller
 from mpc.loop.reduced import ReducedBuilding
 from mpc.loop.simulated import SimulatedPlant
+from mpc.studies.described import PlantStudy
 from mpc.studies.optimal_control import (
     LASTING,
     SENSOR_NOISE,
@@ -30,7 +33,10 @@ from thermal.model.modal import modal_model
 from thermal.model.reduce import ReducedModel
 
 #: Makes a controller for a plant of a study.
-ControllerFactory = Callable[[Study, SimulatedPlant], Controller]
+ControllerFactory = Callable[[Any, Any], Controller]
+
+#: What a controller runs on: buildings of cases, described plants, or both.
+Subject = Literal["case", "plant", "any"]
 
 
 @dataclass(frozen=True)
@@ -49,6 +55,8 @@ class RegisteredController:
         Whether it acts every control step of the study and gets forecasts; others act every step of the plant.
     perfect : bool
         Whether its sensors are exact and its forecasts know weather and people.
+    subject : str
+        ``case`` for a `Study` of a case's building, ``plant`` for a `PlantStudy` of a described plant, or ``any``.
     """
 
     name: str
@@ -57,6 +65,7 @@ class RegisteredController:
     about: str
     predictive: bool = False
     perfect: bool = False
+    subject: Subject = "case"
 
 
 #: Controllers by name.
@@ -64,7 +73,13 @@ REGISTERED: dict[str, RegisteredController] = {}
 
 
 def register_controller(
-    name: str, *, title: str = "", about: str = "", predictive: bool = False, perfect: bool = False
+    name: str,
+    *,
+    title: str = "",
+    about: str = "",
+    predictive: bool = False,
+    perfect: bool = False,
+    subject: Subject = "case",
 ) -> Callable[[ControllerFactory], ControllerFactory]:
     """Register a function that makes a controller, as a decorator with a name.
 
@@ -78,6 +93,8 @@ def register_controller(
         Whether it acts every control step of the study and gets forecasts.
     perfect : bool
         Whether its sensors are exact and its forecasts know weather and people.
+    subject : str
+        What it runs on: ``case``, ``plant`` or ``any``.
 
     Raises
     ------
@@ -98,27 +115,31 @@ def register_controller(
     def register(make: ControllerFactory) -> ControllerFactory:
         taken = name in REGISTERED and REGISTERED[name].make.__qualname__ != make.__qualname__
         ControlError.unless(not taken, "controller", f"a name beside {', '.join(REGISTERED)}", repr(name))
-        REGISTERED[name] = RegisteredController(name, make, title or name, about, predictive, perfect)
+        REGISTERED[name] = RegisteredController(name, make, title or name, about, predictive, perfect, subject)
         return make
 
     return register
 
 
-def find_controller(name: str) -> RegisteredController:
+def find_controller(name: str, subject: Subject = "any") -> RegisteredController:
     """Find a controller by name.
 
     Parameters
     ----------
     name : str
-        ``mpc``, ``schedule``, ``reset``, ``guideline36``, ``bound``, or one that was registered.
+        ``mpc``, ``schedule``, ``reset``, ``guideline36``, ``bound``, or one that was registered; of described plants
+        ``mpc``, ``full_speed`` or ``own``.
+    subject : str
+        What it shall run on.
 
     Raises
     ------
     ControlError
         When there is none of this name; with the nearest one.
     """
-    ControlError.unless_known(name, REGISTERED, "controller", f"one of {', '.join(REGISTERED)}")
-    return REGISTERED[name]
+    known = {n: entry for n, entry in REGISTERED.items() if "any" in (subject, entry.subject) or entry.subject == subject}
+    ControlError.unless_known(name, known, "controller", f"one of {', '.join(known)}")
+    return known[name]
 
 
 def required_actuators(plant: SimulatedPlant) -> tuple[Actuator, ...]:
@@ -133,11 +154,13 @@ def required_actuators(plant: SimulatedPlant) -> tuple[Actuator, ...]:
 
 
 @register_controller(
-    "mpc", title="optimal control", predictive=True,
-    about="Every {step} minutes supply air and water are chosen so that energy and discomfort cost least over the "
+    "mpc", title="optimal control", predictive=True, subject="any",
+    about="Every {step} minutes {decided} are chosen so that energy and discomfort cost least over the "
     "next {hours:g} hours, according to the model of the building, the forecast and the prices.",
 )  # fmt: skip
-def _optimal(study: Study, plant: SimulatedPlant) -> Controller:
+def _optimal(study: Study | PlantStudy, plant: Any) -> Controller:
+    if isinstance(study, PlantStudy):
+        return study.optimal(plant)
     ahead = default_horizon(study.settings.control_step, HORIZON_HOURS)
     return make_controller(study.model, plant, settings=study.controller_settings, horizon=ahead)
 
@@ -175,6 +198,22 @@ def _bound(study: Study, plant: SimulatedPlant) -> Controller:
         study.truth, plant, settings=study.controller_settings, observer=knowing_observer(study.truth, plant),
         horizon=default_horizon(study.settings.control_step, HORIZON_HOURS),
     )  # fmt: skip
+
+
+@register_controller(
+    "own", title="the plant's own control", subject="plant", about="Nothing is set: the plant is left to itself."
+)
+def _own(study: PlantStudy, plant: Any) -> Controller:
+    return OwnControl()
+
+
+@register_controller(
+    "full_speed", title="full speed with lead", subject="plant",
+    about="Machines run at full speed from the lower edge of the comfort band to half a kelvin above it, and not at all "
+    "otherwise; the edge is the highest of the next three hours, so that zones are set back in between.",
+)  # fmt: skip
+def _full_speed(study: PlantStudy, plant: Any) -> Controller:
+    return study.full_speed(plant)
 
 
 #: Unmeasured heat of a plant that is known, but for the random shuffle of its air [W/m2].

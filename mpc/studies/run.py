@@ -11,13 +11,16 @@ import pandas as pd
 from calibration.progress import Forward, Progress
 from mpc.control.controller.controller import MpcController
 from mpc.control.controller.site import Action
+from mpc.control.identified.controller import PlannedAction
 from mpc.control.predictor.predictor import Predictor
 from mpc.errors import ControlError
+from mpc.identify.telemetry import on_control_steps, run_recorded
 from mpc.kpi.kpis import Kpis, measure_kpis
 from mpc.loop.plant import Controller, Measurements
 from mpc.loop.run import ClosedLoopRun, run_closed_loop
 from mpc.loop.simulated import SimulatedPlant
 from mpc.scenario.forecast import Forecast
+from mpc.studies.described import PlantStudy, RecordedPlant, SeenStudy
 from mpc.studies.optimal_control import MODEL_STEP
 from mpc.studies.registry import RegisteredController, find_controller
 from mpc.studies.study import Study
@@ -68,7 +71,7 @@ class ControlRun:
     ----------
     entry : RegisteredController
         Which controller.
-    study : Study
+    study : Study or SeenStudy
         What it was run on.
     loop : ClosedLoopRun
         Record, measurements and actions.
@@ -76,16 +79,16 @@ class ControlRun:
         Indicators.
     decisions : tuple of Decision
         Of optimal control; () for rules.
-    plant : SimulatedPlant
+    plant : SimulatedPlant or RecordedPlant
         As the run left it, with its telemetry.
     """
 
     entry: RegisteredController
-    study: Study
+    study: Study | SeenStudy
     loop: ClosedLoopRun
     kpis: Kpis
     decisions: tuple[Decision, ...]
-    plant: SimulatedPlant
+    plant: SimulatedPlant | RecordedPlant
 
     @property
     def controller(self) -> str:
@@ -100,7 +103,7 @@ class ControlRun:
     @property
     def objective(self) -> float:
         """Cost with discomfort at the price that optimal control has for it [currency]."""
-        return self.cost + self.study.settings.comfort_price * len(self.study.scenario.zones) * self.kpis.tdis_tot
+        return self.cost + self.study.comfort_price * len(self.study.scenario.zones) * self.kpis.tdis_tot
 
     @property
     def sources(self) -> Mapping[str, int]:
@@ -108,12 +111,12 @@ class ControlRun:
         return Counter(decision.source for decision in self.decisions)
 
 
-def run_controller(study: Study, name: str, progress: Progress | None = None) -> ControlRun:
+def run_controller(study: Study | PlantStudy, name: str, progress: Progress | None = None) -> ControlRun:
     """Run a study with a controller.
 
     Parameters
     ----------
-    study : Study
+    study : Study or PlantStudy
         What it is run on.
     name : str
         ``mpc``, ``schedule``, ``reset``, ``guideline36``, one that was registered, or ``bound``: optimal control with
@@ -131,20 +134,42 @@ def run_controller(study: Study, name: str, progress: Progress | None = None) ->
     --------
     >>> run_controller(study, "guideline36").kpis.cost_tot  # doctest: +SKIP
     """
-    entry = find_controller(name)
+    if isinstance(study, PlantStudy):
+        return _run_described(study, name, progress)
+    entry = find_controller(name, "case")
     step = study.settings.control_step if entry.predictive else MODEL_STEP
     plant = study.plant(step, bound=entry.perfect)
-    controller = entry.make(study, plant)
-    asked = callable(getattr(controller, "step", None))
-    expected, advice = "an object with step(measurements, forecast)", "return one from the function that was registered"
-    ControlError.unless(asked, f"controller {name!r}", expected, repr(controller), advice)
-    watched = _Watched(controller)
+    watched = _Watched(_made(entry, study, plant))
     count = int(study.steps * MODEL_STEP / step)
     report = None if progress is None else (lambda done, _: progress(name, done, count))
     seed, ahead = study.settings.seed, entry.predictive
     loop = run_closed_loop(plant, watched, steps=count, seed=seed, forecasts=ahead, progress=report)
     kpis = measure_kpis(loop.record, plant.scenario, control_step=step)
     return ControlRun(entry, study, loop, kpis, tuple(watched.decisions), plant)
+
+
+def _run_described(study: PlantStudy, name: str, progress: Progress | None) -> ControlRun:
+    """Run a described plant on its control steps; indicators are measured on its own ones."""
+    entry = find_controller(name, "plant")
+    with study.plant() as plant:
+        watched, scenario = _Watched(_made(entry, study, plant)), study.scenario(plant)
+        total = scenario.grid.n_steps - plant.forecaster.horizon
+        report = None if progress is None else (lambda done, _: progress(name, done, total))
+        loop, seen = run_recorded(plant, watched, study.site, progress=report)
+        kpis = measure_kpis(loop.record, scenario, control_step=plant.control_step)
+        left = RecordedPlant(seen, tuple(plant.columns), plant.control_step)
+    steps = len(loop.measurements)
+    coarse = loop._replace(record=on_control_steps(loop.record, left.control_step))
+    return ControlRun(entry, SeenStudy(study, scenario, steps), coarse, kpis, tuple(watched.decisions), left)
+
+
+def _made(entry: RegisteredController, study: Study | PlantStudy, plant: Any) -> Controller:
+    """Make a controller, and refuse what is none."""
+    controller = entry.make(study, plant)
+    asked = callable(getattr(controller, "step", None))
+    expected, advice = "an object with step(measurements, forecast)", "return one from the function that was registered"
+    ControlError.unless(asked, f"controller {entry.name!r}", expected, repr(controller), advice)
+    return controller
 
 
 class _Watched:
@@ -157,6 +182,8 @@ class _Watched:
         action = self._controller.step(measurements, forecast)
         if isinstance(action, Action) and isinstance(self._controller, MpcController):
             self.decisions.append(_decision(action, self._controller.problem.predictor))
+        elif isinstance(action, PlannedAction):
+            self.decisions.append(_planned(action))
         return action
 
 
@@ -171,6 +198,18 @@ def _decision(action: Action, predictor: Predictor) -> Decision:
         power = float(share @ solution.rollout.electric[:row]), float(share @ solution.rollout.fuel[:row])
     status, seconds = ("", 0.0) if solution is None else (str(solution.status), solution.seconds)
     return Decision(action.stamp, str(action.source), status, action.reasons, zone, power, seconds)
+
+
+def _planned(action: PlannedAction) -> Decision:
+    """Keep what an action of a described plant expected."""
+    solution, step = action.solution, action.step
+    if solution is None:
+        return Decision(action.stamp, action.source, "", action.reasons, np.full(1, np.nan), (np.nan, np.nan), 0.0)
+    row = max(round(AHEAD / step), 1)
+    power = action.power[:row].mean(axis=0)
+    powers = float(power[0]), float(power[1])
+    told = str(solution.status), action.reasons
+    return Decision(action.stamp, action.source, *told, action.zone[min(row, len(action.zone) - 1)], powers, action.seconds)
 
 
 def prediction_errors(run: ControlRun) -> dict[str, Any]:
@@ -226,13 +265,13 @@ class Comparison:
 
     Parameters
     ----------
-    study : Study
+    study : Study or SeenStudy
         What they were run on.
     runs : tuple of ControlRun
         In the order asked for.
     """
 
-    study: Study
+    study: Study | SeenStudy
     runs: tuple[ControlRun, ...]
 
     def of(self, controller: str) -> ControlRun | None:
@@ -281,12 +320,12 @@ class Comparison:
         return (best.objective - run.objective) / (best.objective - bound.objective)
 
 
-def compare_controllers(study: Study, names: Sequence[str], progress: Progress | None = None) -> Comparison:
+def compare_controllers(study: Study | PlantStudy, names: Sequence[str], progress: Progress | None = None) -> Comparison:
     """Run several controllers on a study, one after the other.
 
     Parameters
     ----------
-    study : Study
+    study : Study or PlantStudy
         What they are run on.
     names : sequence of str
         Such as ``("guideline36", "mpc", "bound")``.
@@ -305,4 +344,4 @@ def compare_controllers(study: Study, names: Sequence[str], progress: Progress |
     for number, name in enumerate(known):
         part = whole.part(left[number] / sum(left[number:]), f"controller {number + 1} of {len(known)}")
         runs.append(run_controller(study, name, part))
-    return Comparison(study, tuple(runs))
+    return Comparison(runs[0].study, tuple(runs))

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -96,6 +97,44 @@ class Study:
     settings: StudySettings
     notes: tuple[str, ...] = ()
     weather: str = "as measured with the case"
+
+    decided = "supply air and water"
+    hours = HORIZON_HOURS
+    about = (
+        "The plant is simulated: the building of the case with the parameters given, in closed loop with air handlers, "
+        "terminals and a boiler"
+    )
+
+    @property
+    def comfort_price(self) -> float:
+        """Of a zone's kelvin outside of its band for an hour [currency/K/h]."""
+        return self.settings.comfort_price
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """How the plant is simulated, for a file."""
+        given = self.settings
+        return {"building": given.kind, "step_seconds": self.scenario.grid.step, "noise": given.noise is not None,
+                "effects": list(self.built.effects)}  # fmt: skip
+
+    @property
+    def setup(self) -> str:
+        """How the plant is simulated, in words."""
+        given = self.settings
+        sensors = "sensors with noise" if given.noise else "exact sensors"
+        weather = "with errors" if given.errors else "perfect"
+        step = self.scenario.grid.step
+        return f"building {given.kind}, steps of {step:g} s, {sensors}, weather forecast {weather}"
+
+    @property
+    def forecast(self) -> str:
+        """Whether forecasts are ``perfect`` or ``with errors``."""
+        return "with errors" if self.settings.errors else "perfect"
+
+    @property
+    def seed(self) -> int:
+        """Of all that is random."""
+        return self.settings.seed
 
     @property
     def building(self) -> Building:

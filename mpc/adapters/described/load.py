@@ -74,18 +74,60 @@ def load_plant(
     --------
     >>> plant = load_plant("bestest_hydronic_heat_pump", at="http://127.0.0.1:5000")  # doctest: +SKIP
     """
-    place = _place(path)
-    given = dict(changes or {})
-    if at is not None:
-        server = str(at).startswith(("http://", "https://"))
-        file = None if server else str(Path(at).resolve())
-        given["plant"] = {"kind": "boptest", "url": str(at)} if server else {"kind": "fmu", "file": file}
-    parsed = _read(place, given)
+    parsed, place = read_description(path, at=at, changes=changes), _place(path)
     if isinstance(parsed.plant, ServerProgram):
         return _server_plant(parsed, parsed.plant)
     if isinstance(parsed.plant, EnergyPlusProgram):
         return _energyplus(parsed, parsed.plant, place.parent)
     return _unit_plant(parsed, parsed.plant, place.parent)
+
+
+def read_description(
+    path: str | Path, *, at: str | Path | None = None, changes: Mapping[str, Any] | None = None
+) -> PlantFile:
+    """Read a description without making its plant.
+
+    Parameters
+    ----------
+    path, at, changes
+        As of `load_plant`.
+
+    Raises
+    ------
+    PlantError
+        When it does not fit its schema.
+    """
+    given = dict(changes or {})
+    if at is not None:
+        server = str(at).startswith(("http://", "https://"))
+        file = None if server else str(Path(at).resolve())
+        given["plant"] = {"kind": "boptest", "url": str(at)} if server else {"kind": "fmu", "file": file}
+    return _read(_place(path), given)
+
+
+def period_of(path: str | Path, file: PlantFile) -> tuple[pd.Timestamp, float]:
+    """Tell when a description's period begins, local, and how long it is [d].
+
+    Parameters
+    ----------
+    path : str or Path
+        The description.
+    file : PlantFile
+        As read.
+
+    Raises
+    ------
+    PlantError
+        When only a server knows.
+    """
+    if isinstance(file.period, Period):
+        clock, span = _span(file.period, file.location.timezone)
+    elif isinstance(file.plant, UnitProgram):
+        unit = _place(path).parent / file.plant.file
+        clock, span = YearClock(file.year, file.location.timezone), _Span(*unit_period(unit, file.period))
+    else:
+        raise PlantError("period", "its start and days", f"{file.period!r}, which a server knows", "give --start and --end")
+    return clock.stamp(span.start), span.duration / DAY
 
 
 def _place(path: str | Path) -> Path:

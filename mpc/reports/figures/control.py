@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from mpc.reports.figures import style
 from mpc.reports.figures.style import CELSIUS, MEASURED, MUTED, SIMULATED, Picture, picture, styled
 from mpc.reports.means import NOTICED
+from mpc.studies.described import RecordedPlant
 from mpc.studies.run import AHEAD, ControlRun, compared_decisions
 from thermal._types import FloatArray
 
@@ -63,7 +64,8 @@ def course(run: ControlRun) -> list[Picture]:
 
 
 def _legend(axes: Axes, beside: float = 1.01) -> None:
-    axes.legend(loc="upper left", bbox_to_anchor=(beside, 1.0), fontsize=8)
+    if axes.get_legend_handles_labels()[0]:  # a controller may have set nothing
+        axes.legend(loc="upper left", bbox_to_anchor=(beside, 1.0), fontsize=8)
 
 
 def _right(axes: Axes, ylabel: str, colour: str, label: str) -> Axes:
@@ -92,8 +94,11 @@ def _zones(axes: Axes, run: ControlRun, x: FloatArray) -> None:
 
 
 def _setpoints(axes: Axes, run: ControlRun) -> None:
-    air, water = _actions(run, _SUPPLY_AIR), _actions(run, _SUPPLY_WATER)
     x = style.day_numbers(pd.DatetimeIndex(run.loop.actions.index))
+    if isinstance(run.plant, RecordedPlant):
+        _values_set(axes, run, x)
+        return
+    air, water = _actions(run, _SUPPLY_AIR), _actions(run, _SUPPLY_WATER)
     for column, colour in zip(air, (MEASURED, _GREEN, _PINK, _YELLOW), strict=False):
         label = "supply air" if len(air.columns) == 1 else str(column).partition("/")[0]
         axes.step(x, air[column], where="pre", color=colour, linewidth=1.2, label=label)
@@ -101,6 +106,20 @@ def _setpoints(axes: Axes, run: ControlRun) -> None:
     right = _right(axes, "supply water [°C]", SIMULATED, "supply water")
     for column in water:
         right.step(x, water[column], where="pre", color=SIMULATED, linewidth=1.2)
+
+
+def _values_set(axes: Axes, run: ControlRun, x: FloatArray) -> None:
+    """Draw whatever was set of a described plant: setpoints on the left, commands on the right."""
+    warm = [name for name in run.loop.actions if str(name).endswith("setpoint")]
+    others = [name for name in run.loop.actions if name not in warm]
+    for column, colour in zip(warm, (MEASURED, _GREEN, _PINK, _YELLOW), strict=False):
+        axes.step(x, run.loop.actions[column] - CELSIUS, where="pre", color=colour, linewidth=1.2, label=column)
+    axes.set(title="What was set", ylabel="[°C]" if warm else "")
+    drawn = _right(axes, "command [-]", MUTED, "commands") if warm and others else axes
+    for column, colour in zip(others, (SIMULATED, _SKY, MUTED, _GREEN), strict=False):
+        drawn.step(x, run.loop.actions[column], where="pre", color=colour, linewidth=1.2, label=column)
+    if others and not warm:
+        axes.set_ylabel("command [-]")
 
 
 def _actions(run: ControlRun, kind: str) -> pd.DataFrame:
@@ -146,7 +165,7 @@ def expectations(run: ControlRun) -> list[Picture]:
 
 @styled
 def side_by_side(runs: Sequence[ControlRun]) -> list[Picture]:
-    """Draw cost, setpoints and the coldest and warmest zone of several controllers.
+    """Draw cost, the coldest and warmest zone, and setpoints or power of several controllers.
 
     Parameters
     ----------
@@ -157,6 +176,7 @@ def side_by_side(runs: Sequence[ControlRun]) -> list[Picture]:
     figure = Figure(figsize=(10.0, 9.5))
     cost, zones, air, water = figure.subplots(4, 1, sharex=True)
     x = style.lines_over_time(water, study.stamps, ticks=9)
+    described = isinstance(runs[0].plant, RecordedPlant)
     _comfort_band(zones, runs[0], x)
     for run in runs:
         colour = _COLOURS.get(run.controller) or _OWN[next(own) % len(_OWN)]
@@ -165,16 +185,24 @@ def side_by_side(runs: Sequence[ControlRun]) -> list[Picture]:
         zone = run.loop.record.zone_temperature[1 : study.steps + 1] - CELSIUS
         zones.plot(x, zone.min(axis=1), **line)
         zones.plot(x, zone.max(axis=1), **line)
+        if described:
+            air.step(x, run.loop.record.electricity[: study.steps] / _KILO, where="pre", **line)
+            water.plot(x, _outside_so_far(run), **line)
+            continue
         acted = style.day_numbers(pd.DatetimeIndex(run.loop.actions.index))
         for axes, kind in ((air, _SUPPLY_AIR), (water, _SUPPLY_WATER)):
             if not (actions := _actions(run, kind)).empty:
                 axes.step(acted, actions.mean(axis=1), where="pre", **line)
     cost.set(title="Energy cost so far", ylabel=f"[{study.scenario.currency}]")
     zones.set(title="Coldest and warmest zone", ylabel="[°C]")
-    air.set(title="Supply air setpoint", ylabel="[°C]")
-    water.set(title="Supply water setpoint", ylabel="[°C]")
+    if described:
+        air.set(title="Electricity", ylabel="[kW]")
+        water.set(title="Outside of the comfort band so far, mean zone", ylabel="[K h]")
+    else:
+        air.set(title="Supply air setpoint", ylabel="[°C]")
+        water.set(title="Supply water setpoint", ylabel="[°C]")
     _legend(cost)
-    return [picture(figure, "Cost, zone temperatures and setpoints of the controllers over time", zoom=True)]
+    return [picture(figure, "Cost, zone temperatures and setpoints or power of the controllers over time", zoom=True)]
 
 
 @styled
@@ -207,6 +235,14 @@ def cost_bars(runs: Sequence[ControlRun]) -> list[Picture]:
         right.set_xlabel("outside of the band, mean zone [K h]")
     told = "and discomfort of the controllers" if some else "of the controllers; no zone left its comfort band"
     return [picture(figure, f"Energy cost {told}")]
+
+
+def _outside_so_far(run: ControlRun) -> FloatArray:
+    """Integral of what zones lack or exceed of their bands, mean of the zones, shape (n_steps,) [K h]."""
+    scenario, n = run.study.scenario, run.study.steps
+    zone = run.loop.record.zone_temperature[1 : n + 1]
+    outside = np.maximum(np.maximum(scenario.lower[:n] - zone, zone - scenario.upper[:n]), 0.0)
+    return np.asarray(np.cumsum(outside.mean(axis=1)) * run.loop.record.step / 3600.0)
 
 
 def _costs(run: ControlRun) -> tuple[FloatArray, FloatArray]:

@@ -1,0 +1,135 @@
+"""A controller on a foreign plant for two weeks, and what came of it."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from _foreign_do_mpc import DoMpcController
+from _foreign_rules import ProportionalIntegral
+from foreign_models.periods import DAYS, starts
+from foreign_models.plants import PLANTS, write_plant
+
+from mpc.adapters.energyplus.input import weather_path
+from mpc.baselines.plants import LEAD, FullSpeed, OwnControl
+from mpc.identify.excitation import ExcitationSettings
+from mpc.identify.identify import identify
+from mpc.identify.model import FILE, PlantModel, read_model
+from mpc.kpi.kpis import measure_kpis
+from mpc.loop.plant import Controller, Measurements
+from mpc.loop.run import ClosedLoopRun, run_closed_loop
+from mpc.scenario.forecast import Forecast
+from mpc.scenario.scenario import Scenario
+from mpc.studies.described import PlantStudy, experiment_period, run_experiment
+
+#: Length of the experiment that a plant is identified on [d].
+EXPERIMENT = 14
+#: Starts are those of the compressor, by its power.
+_COMPRESSOR = "heat_pump/electrical_power_sensor"
+_RUNS = 200.0  # W that a compressor draws when it runs; crankcase heaters draw 50
+_COLD = 0.01  # K below the band that count as time below it
+
+#: Controllers by name, of a study and its plant.
+CONTROLLERS: dict[str, Callable[[PlantStudy, Any], Controller]] = {
+    "own": lambda study, plant: OwnControl(),
+    "rule": lambda study, plant: study.full_speed(plant),
+    "long rule": lambda study, plant: FullSpeed(study.machines(plant), lead=2.0 * LEAD),
+    "pi": lambda study, plant: ProportionalIntegral(study.machines(plant)),
+    "mpc": lambda study, plant: study.optimal(plant),
+    "mpc perfect": lambda study, plant: study.optimal(plant),
+    "do-mpc": lambda study, plant: DoMpcController(study.optimal(plant), plant.forecaster.horizon),
+}
+
+
+@dataclass
+class Timed:
+    """A controller whose CPU time is kept; EnergyPlus' own is that of another process.
+
+    Parameters
+    ----------
+    controller : Controller
+        That decides.
+    """
+
+    controller: Controller
+    seconds: list[float] = field(default_factory=list, init=False)
+
+    def step(self, measurements: Measurements, forecast: Forecast | None) -> Mapping[str, float]:
+        """Pass on."""
+        begin = time.process_time()
+        chosen = self.controller.step(measurements, forecast)
+        self.seconds.append(time.process_time() - begin)
+        return chosen
+
+
+def run(name: str, which: str, controller: str, out: Path) -> dict[str, Any]:
+    """Let a controller run a plant in its ``coldest`` or ``typical`` period; optimal control is identified first."""
+    perfect = controller == "mpc perfect"
+    folder = out / ("plants_foreseen" if perfect else "plants")
+    path = write_plant(name, folder, "none" if perfect else "day_ahead")
+    model, spent = identified(name, out) if "mpc" in controller else (None, {})
+    begin = pd.Timestamp(starts(weather_path(PLANTS[name].weather))[which])
+    study = PlantStudy(path, start=f"{begin:%Y-%m-%d}", end=f"{begin + pd.Timedelta(days=DAYS):%Y-%m-%d}", model=model)
+    with study.plant() as plant:
+        timed = Timed(CONTROLLERS[controller](study, plant))
+        loop = run_closed_loop(plant, timed, forecasts=True)
+        return account(loop, study.scenario(plant), timed.seconds) | spent
+
+
+def identified(name: str, out: Path) -> tuple[PlantModel, dict[str, Any]]:
+    """Identify a plant by an experiment beside its coldest period, or read what came of it: model, and what it took."""
+    path, folder = write_plant(name, out / "plants"), out / "models" / name
+    file = folder / "spent.json"
+    if not file.exists():
+        begin = time.process_time()
+        study = PlantStudy(path, None, *experiment_period(path, None, EXPERIMENT))
+        made = run_experiment(study, EXPERIMENT, ExcitationSettings())
+        found = identify(made.telemetry, made.machines)
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / FILE).write_text(json.dumps(found.model.to_dict()) + "\n", encoding="utf-8")
+        kpis = measure_kpis(made.run.record, made.scenario)
+        spent = {"identify_cpu_seconds": time.process_time() - begin, "experiment_cost": kpis.cost_tot,
+                 "experiment_discomfort": kpis.tdis_tot}  # fmt: skip
+        file.write_text(json.dumps(spent) + "\n", encoding="utf-8")
+    return read_model(folder), dict(json.loads(file.read_text(encoding="utf-8")))
+
+
+def account(loop: ClosedLoopRun, scenario: Scenario, seconds: list[float]) -> dict[str, Any]:
+    """Measure a run.
+
+    Parameters
+    ----------
+    loop : ClosedLoopRun
+        Two weeks.
+    scenario : Scenario
+        Prices and bands.
+    seconds : list of float
+        CPU time of each action [s].
+    """
+    record = loop.record
+    kpis = measure_kpis(record, scenario)
+    parts = round(scenario.grid.step / record.step)
+    lower = np.repeat(scenario.lower, parts, axis=0)[: record.n_steps]
+    cold = (record.zone_temperature[1:] < lower - _COLD).sum(axis=0) * record.step / 3600.0
+    days = kpis.hours / 24.0
+    return {
+        "cost": kpis.cost_tot, "energy": kpis.ener_tot, "discomfort": kpis.tdis_tot,
+        "below": float(np.mean([z.below for z in kpis.zones])), "above": float(np.mean([z.above for z in kpis.zones])),
+        "zones": {z.zone: {"below": z.below, "above": z.above, "largest_below": z.largest_below} for z in kpis.zones},
+        "hours_below": float(cold.mean()), "starts_a_day": _starts(loop.measurements, days),
+        "cpu_seconds": float(np.sum(seconds)), "days": days,
+    }  # fmt: skip
+
+
+def _starts(measurements: pd.DataFrame, days: float) -> float | None:
+    """Count the compressor's starts a day that control steps show; None where there is none."""
+    if _COMPRESSOR not in measurements:
+        return None
+    on = measurements[_COMPRESSOR].to_numpy() > _RUNS
+    return float((on[1:] & ~on[:-1]).sum()) / days

@@ -1,0 +1,119 @@
+"""A shop with a unitary heat pump: direct expansion, one speed, electric resistance where it is not enough."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from energyplus_trials.frame import Objects
+
+from foreign_models import objects as ep
+from foreign_models.thermostats import clock, comfort, present, thermostat, thermostat_points
+from mpc.adapters.energyplus.input import InputFile, building_path, read_input
+
+ZONE, UNIT = "SHOP", "HEAT PUMP"
+FABRIC = ep.Fabric(wall=0.06, roof=0.10, floor=0.05, glass=(2.2, 0.45), air_changes=0.5, heavy=False, goods=3.0)
+LENGTH, DEPTH, HEIGHT = 18.0, 12.0, 3.6  # m
+PEOPLE, APPLIANCES = 8.0, 600.0  # W, of lights and tills that nothing measures
+#: Capacity at 8.3 degC outdoors [W], and air [m3/s], 5 m3/s per 100 kW: usual of packaged units.
+CAPACITY, AIR = 24_000.0, 1.2
+RESISTANCE = 8_000.0  # W, below the outdoor temperature up to which it is let in
+_LET_IN = -5.0  # degC
+_FAN = (250.0, 0.5)  # Pa, and total efficiency [-]: 600 W
+#: Whose compressor curves the unit has.
+SOURCE = "ASHRAE901_OfficeSmall_STD2019_Denver"
+WEEKDAY = [8 <= hour < 20 for hour in range(24)]
+WEEKEND = [9 <= hour < 18 for hour in range(24)]
+_HEATING, _COOLING = "Coil:Heating:DX:SingleSpeed", "Coil:Cooling:DX:SingleSpeed"
+
+
+def shop() -> Objects:
+    """Return the shop's input."""
+    model = ep.start(FABRIC)
+    parts: list[Any] = [
+        ep.box(ZONE, (0.0, 0.0), (LENGTH, DEPTH, HEIGHT), {"south": 22.0}, {"east": "", "west": ""}),
+        ep.inside(ZONE, FABRIC, LENGTH * DEPTH, PEOPLE, "presence", APPLIANCES),
+        thermostat(ZONE, clock(WEEKDAY), clock(WEEKEND), cooled=True),
+        ep.equipment(ZONE, [("AirLoopHVAC:UnitarySystem", UNIT)], f"{UNIT} out", f"{UNIT} in"),
+        {"Schedule:Compact": {"presence": ep.daily([float(h) for h in WEEKDAY], [float(h) for h in WEEKEND])}},
+        _unit(), *_coils(),
+    ]  # fmt: skip
+    for part in parts:
+        ep.merge(model, part)
+    return model
+
+
+def _unit() -> Objects:
+    flows: dict[str, Any] = {}
+    for mode in ("heating", "cooling"):
+        flows |= {f"{mode}_supply_air_flow_rate": AIR, f"{mode}_supply_air_flow_rate_method": "SupplyAirFlowRate"}
+    return {
+        "AirLoopHVAC:UnitarySystem": {UNIT: {
+            "control_type": "Load", "controlling_zone_or_thermostat_location": ZONE,
+            "air_inlet_node_name": f"{UNIT} in", "air_outlet_node_name": f"{UNIT} out",
+            "availability_schedule_name": ep.ALWAYS,
+            "supply_fan_object_type": "Fan:OnOff", "supply_fan_name": f"{UNIT} fan", "fan_placement": "BlowThrough",
+            "supply_air_fan_operating_mode_schedule_name": "fan cycles", "heating_coil_object_type": _HEATING,
+            "heating_coil_name": f"{UNIT} heating", "cooling_coil_object_type": _COOLING,
+            "cooling_coil_name": f"{UNIT} cooling", "supplemental_heating_coil_object_type": "Coil:Heating:Electric",
+            "supplemental_heating_coil_name": f"{UNIT} resistance", **flows,
+            "no_load_supply_air_flow_rate_method": "SupplyAirFlowRate", "no_load_supply_air_flow_rate": 0.0,
+            "maximum_supply_air_temperature": 45.0,
+            "maximum_outdoor_dry_bulb_temperature_for_supplemental_heater_operation": _LET_IN,
+        }},
+        "Schedule:Constant": {"fan cycles": ep.constant(0.0)},
+        "Fan:OnOff": {f"{UNIT} fan": {
+            "availability_schedule_name": ep.ALWAYS, "fan_total_efficiency": _FAN[1], "pressure_rise": _FAN[0],
+            "maximum_flow_rate": AIR, "air_inlet_node_name": f"{UNIT} in", "air_outlet_node_name": f"{UNIT} fan out",
+        }},
+        "Coil:Heating:Electric": {f"{UNIT} resistance": {
+            "nominal_capacity": RESISTANCE, "air_inlet_node_name": f"{UNIT} heating out",
+            "air_outlet_node_name": f"{UNIT} out",
+        }},
+        "OutdoorAir:Node": {f"{UNIT} outdoor": {}},
+    }  # fmt: skip
+
+
+def _coils() -> list[Objects]:
+    """Coils of a reference building's unit at our size, with all their curves."""
+    source = read_input(building_path(SOURCE))
+    sizes = {
+        _HEATING: {"gross_rated_heating_capacity": CAPACITY, "rated_air_flow_rate": AIR,
+                   "air_inlet_node_name": f"{UNIT} cooling out", "air_outlet_node_name": f"{UNIT} heating out",
+                   "resistive_defrost_heater_capacity": 0.0},
+        _COOLING: {"gross_rated_total_cooling_capacity": CAPACITY, "gross_rated_sensible_heat_ratio": 0.75,
+                   "rated_air_flow_rate": AIR, "air_inlet_node_name": f"{UNIT} fan out",
+                   "air_outlet_node_name": f"{UNIT} cooling out", "condenser_air_inlet_node_name": f"{UNIT} outdoor"},
+    }  # fmt: skip
+    found = []
+    for kind, mine in sizes.items():
+        fields = next(iter(source.of_type(kind).values()))
+        found += [_curve(source, str(name)) for key, name in fields.items() if key.endswith("curve_name")]
+        title = f"{UNIT} heating" if kind == _HEATING else f"{UNIT} cooling"
+        found.append({kind: {title: {**fields, **mine, "availability_schedule_name": ep.ALWAYS}}})
+    return found
+
+
+def _curve(source: InputFile, name: str) -> Objects:
+    kind, title, fields = next(each for each in source.begins("Curve:") if each[1].lower() == name.lower())
+    return {kind: {title: dict(fields)}}
+
+
+def description() -> dict[str, Any]:
+    """Return what ``plant.yaml`` says of zones, points and actuators."""
+    measured, acted = thermostat_points(ZONE, "shop")
+    power = [f"{UNIT}, Unitary System Electricity Rate"]
+    return {
+        "zones": {"shop": {
+            "temperature": f"{ZONE}, Zone Mean Air Temperature", "floor_area": LENGTH * DEPTH,
+            "volume": LENGTH * DEPTH * HEIGHT, "comfort": comfort(WEEKDAY, WEEKEND),
+            "people": present(PEOPLE, WEEKDAY, WEEKEND),
+        }},
+        "measurements": measured | {
+            "heat_pump/electrical_power_sensor": power[0],
+            "heat_pump/supply_fan_power_sensor": f"{UNIT} fan, Fan Electricity Rate",
+            "heat_pump/heating_power_sensor": f"{UNIT}, Unitary System Total Heating Rate",
+            "heat_pump/supply_air_temperature_sensor": f"{UNIT} out, System Node Temperature",
+        },
+        "actuators": acted,
+        "energy": {"electricity": power},
+    }  # fmt: skip

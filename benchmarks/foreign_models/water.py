@@ -1,0 +1,88 @@
+"""A loop of hot water with one machine, one pump and one or more consumers, as EnergyPlus wants its branches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from energyplus_trials.frame import Objects
+
+from foreign_models.objects import merge
+
+
+def water_loop(
+    name: str, pump: dict[str, Any], machine: tuple[str, str], consumers: Sequence[tuple[str, str]],
+    scheme: tuple[str, str], flow: float,
+) -> Objects:  # fmt: skip
+    """Return the loop; the machine's and consumers' nodes are called ``NAME in`` and ``NAME out``.
+
+    Parameters
+    ----------
+    name : str
+        Of the loop.
+    pump : dict
+        Fields of a ``Pump:ConstantSpeed`` beside its nodes.
+    machine : tuple of str
+        Class and name.
+    consumers : sequence of tuple of str
+        Class and name of each.
+    scheme : tuple of str
+        Class and name of the operation scheme.
+    flow : float
+        Largest flow [m3/s].
+    """
+    found: Objects = {"Pump:ConstantSpeed": {
+        f"{name} pump": {**pump, "inlet_node_name": f"{name} supply in", "outlet_node_name": f"{name} pump out"}
+    }}  # fmt: skip
+
+    def branch(title: str, kind: str, what: str, nodes: tuple[str, str]) -> str:
+        found.setdefault("Branch", {})[title] = {"components": [{
+            "component_object_type": kind, "component_name": what, "component_inlet_node_name": nodes[0],
+            "component_outlet_node_name": nodes[1],
+        }]}  # fmt: skip
+        return title
+
+    def pipe(title: str, begin: str, end: str) -> str:
+        found.setdefault("Pipe:Adiabatic", {})[title] = {"inlet_node_name": begin, "outlet_node_name": end}
+        return branch(title, "Pipe:Adiabatic", title, (begin, end))
+
+    def side(title: str, first: str, parallel: Sequence[str], last: str) -> None:
+        listed = [{"branch_name": each} for each in (first, *parallel, last)]
+        found.setdefault("BranchList", {})[title] = {"branches": listed}
+        found.setdefault("ConnectorList", {})[title] = {
+            "connector_1_object_type": "Connector:Splitter", "connector_1_name": f"{title} splitter",
+            "connector_2_object_type": "Connector:Mixer", "connector_2_name": f"{title} mixer",
+        }  # fmt: skip
+        found.setdefault("Connector:Splitter", {})[f"{title} splitter"] = {
+            "inlet_branch_name": first,
+            "branches": [{"outlet_branch_name": each} for each in parallel],
+        }
+        found.setdefault("Connector:Mixer", {})[f"{title} mixer"] = {
+            "outlet_branch_name": last,
+            "branches": [{"inlet_branch_name": each} for each in parallel],
+        }
+
+    first = branch(f"{name} pump", "Pump:ConstantSpeed", f"{name} pump", (f"{name} supply in", f"{name} pump out"))
+    side(f"{name} supply", first, [branch(machine[1], *machine, (f"{machine[1]} in", f"{machine[1]} out"))],
+         pipe(f"{name} supply pipe", f"{name} supply pipe in", f"{name} supply out"))  # fmt: skip
+    taking = [branch(what, kind, what, (f"{what} in", f"{what} out")) for kind, what in consumers]
+    bypass = pipe(f"{name} bypass", f"{name} bypass in", f"{name} bypass out")
+    side(f"{name} demand", pipe(f"{name} flow", f"{name} demand in", f"{name} flow out"), [*taking, bypass],
+         pipe(f"{name} return", f"{name} return in", f"{name} demand out"))  # fmt: skip
+    merge(found, {
+        "PlantEquipmentOperationSchemes": {f"{name} operation": {
+            "control_scheme_1_object_type": scheme[0], "control_scheme_1_name": scheme[1],
+            "control_scheme_1_schedule_name": "always",
+        }},
+        "PlantLoop": {name: {
+            "fluid_type": "Water", "plant_equipment_operation_scheme_name": f"{name} operation",
+            "loop_temperature_setpoint_node_name": f"{name} supply out", "maximum_loop_temperature": 80.0,
+            "minimum_loop_temperature": 5.0, "maximum_loop_flow_rate": flow, "minimum_loop_flow_rate": 0.0,
+            "plant_side_inlet_node_name": f"{name} supply in", "plant_side_outlet_node_name": f"{name} supply out",
+            "plant_side_branch_list_name": f"{name} supply", "plant_side_connector_list_name": f"{name} supply",
+            "demand_side_inlet_node_name": f"{name} demand in", "demand_side_outlet_node_name": f"{name} demand out",
+            "demand_side_branch_list_name": f"{name} demand", "demand_side_connector_list_name": f"{name} demand",
+            "load_distribution_scheme": "SequentialLoad",
+        }},
+    })  # fmt: skip
+    return found

@@ -1,0 +1,326 @@
+"""Receding horizon control of an identified plant: duties become runs, with a cost and a limit of starts."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from calibration.estimation.state_space import REFERENCE
+from mpc.control.identified.conformal import ConformalBackOff, Guarantee
+from mpc.control.identified.observer import GreyBoxObserver
+from mpc.control.identified.problem import SCALE, Ahead, IdentifiedProblem
+from mpc.control.solvers.solution import Status
+from mpc.control.solvers.stages import StageSolution, StageSolver
+from mpc.errors import ControlError
+from mpc.identify.maps import MachineMap
+from mpc.identify.model import PlantModel
+from mpc.loop.actuators import Actuator, need_actuator
+from mpc.loop.plant import Measurements
+from mpc.scenario.forecast import Forecast
+from thermal._types import FloatArray
+from thermal.case.building import Location
+
+#: A duty above this is a run, a load below the other one is none [-].
+_HALF, _IDLE = 0.5, 0.02
+
+
+@dataclass(frozen=True)
+class IdentifiedSettings:
+    """Choices of the controller.
+
+    Parameters
+    ----------
+    comfort_price : float
+        Of a zone's kelvin outside of its band for an hour [currency/K/h]: some hundred times what a kelvin less saves
+        a house in an hour, so that bands are left only where they cannot be kept.
+    back_off : float
+        Distance that is kept from the edges of the bands [K]; where a guarantee is asked for, that of its start.
+    start_price : float
+        Of a start of a machine [currency]: a compressor of 5,000 that bears 100,000 starts.
+    starts : int
+        Most starts of a machine within 24 hours.
+    run : float
+        Shortest run and shortest rest of a machine [s].
+    guarantee : Guarantee, optional
+        Share of violations that is asked for.
+    """
+
+    comfort_price: float = 10.0
+    back_off: float = 0.0
+    start_price: float = 0.05
+    starts: int = 10
+    run: float = 1800.0
+    guarantee: Guarantee | None = None
+
+
+@dataclass
+class _Runs:
+    """What a machine has done: whether it runs, since how many steps, and steps of its starts."""
+
+    on: bool = False
+    since: int = 1_000_000
+    starts: deque[int] = field(default_factory=deque)
+
+
+class PlannedAction(dict[str, float]):
+    """Values by ``ENTITY/POINT``, and what was expected of them.
+
+    Parameters
+    ----------
+    values : mapping of str to float
+        [unit of each actuator].
+    stamp : Timestamp
+        When the action begins.
+    source, reasons : str and tuple of str
+        ``optimal plan`` or ``rules``, and why.
+    solution : StageSolution, optional
+        Of the solver.
+    zone, power : ndarray
+        Expected at the edges of the steps, shape (N + 1, n_zone) [K], and electricity and other carriers over them,
+        shape (N, 2) [W].
+    """
+
+    def __init__(self, values: Mapping[str, float], stamp: pd.Timestamp, source: str, reasons: tuple[str, ...]) -> None:
+        super().__init__(values)
+        self.stamp, self.source, self.reasons = stamp, source, reasons
+        self.step, self.seconds = 900.0, 0.0
+        self.solution: StageSolution | None = None
+        self.zone: FloatArray = np.empty((0, 0))
+        self.power: FloatArray = np.empty((0, 2))
+
+
+class IdentifiedController:
+    """Plans a day ahead at every control step, on the grey box with its maps, and does the first step of the plan.
+
+    A machine in duty runs whole steps. At each step the plan is solved twice: with the machine on for its shortest run,
+    and off; later steps stay relaxed. The cheaper of the two is done, starts at their price, which grows as the limit
+    of a day is used up: ``c n_max / (n_max - n)``. Deciding the first step by whole numbers and relaxing the rest is
+    exact for the step that is done, as far as the relaxed rest is what will come.
+
+    Parameters
+    ----------
+    model : PlantModel
+        Identified.
+    actuators : sequence of Actuator
+        Of the plant.
+    location : Location
+        Where it stands, for the sun.
+    settings : IdentifiedSettings, optional
+        Choices.
+
+    Raises
+    ------
+    ControlError
+        When the plant lacks an actuator of the model.
+    """
+
+    def __init__(
+        self,
+        model: PlantModel,
+        actuators: tuple[Actuator, ...],
+        location: Location,
+        settings: IdentifiedSettings | None = None,
+    ) -> None:
+        need_actuator("mpc", [m.machine.name for m in model.maps], actuators, every=True)
+        self.model, self.settings, self._location = model, settings or IdentifiedSettings(), location
+        self._actuators = {a.name: a for a in actuators}
+        self._problem, self._observer = IdentifiedProblem(model), GreyBoxObserver(model)
+        self._solver: StageSolver | None = None
+        self._before: tuple[Ahead, FloatArray] | None = None
+        self._plan: StageSolution | None = None
+        self._runs = [_Runs() for _ in model.maps]
+        self._hold = max(round(self.settings.run / model.step), 1)
+        self._day = round(86_400.0 / model.step)
+        asked = self.settings.guarantee
+        self.conformal = None if asked is None else ConformalBackOff(asked, self.settings.back_off)
+        self.back_offs: list[float] = []
+
+    @property
+    def back_off(self) -> float:
+        """Distance that is kept from the bands now [K]."""
+        return self.settings.back_off if self.conformal is None else self.conformal.value
+
+    def step(self, measurements: Measurements, forecast: Forecast | None) -> PlannedAction:
+        """Choose values of the actuators.
+
+        Parameters
+        ----------
+        measurements : Measurements
+            Of the step that has just ended.
+        forecast : Forecast or None
+            Of what comes; it must be there.
+
+        Raises
+        ------
+        ControlError
+            When there is no forecast.
+        """
+        if forecast is None:
+            raise ControlError("mpc", "forecasts of the plant", "none", "describe its weather and prices")
+        begin = time.perf_counter()
+        ahead = Ahead.of(self.model, forecast, self._location)
+        self._observe(measurements, ahead)
+        if self._solver is None or self._solver.n_steps != len(ahead.outdoor):
+            self._solver, self._plan = StageSolver(self._problem.stage, len(ahead.outdoor), tolerance=1e-6), None
+        self.back_offs.append(self.back_off)
+        solution = self._decided(ahead)
+        levels = solution.decisions[0] if solution is not None else self._by_rule(measurements, ahead)
+        source = "optimal plan" if solution is not None else "rules"
+        reasons = () if solution is not None else ("the solver found no plan",)
+        self._note(levels)
+        self._before, self._plan = (ahead, levels), solution
+        stamp = measurements.stamp
+        action = PlannedAction(self._values(levels, solution, ahead), stamp, source, reasons)
+        action.step, action.seconds = self.model.step, time.perf_counter() - begin
+        if solution is not None:
+            action.solution = solution
+            action.zone = solution.states[:, : len(self.model.box.zones)] + REFERENCE
+            action.power = self._powers(solution, ahead)
+        return action
+
+    def _observe(self, measurements: Measurements, ahead: Ahead) -> None:
+        """Take what was measured, and learn from how comfortable it was."""
+        if self._before is None:
+            self._observer.start(measurements, float(ahead.outdoor[0]))
+            return
+        before, levels = self._before
+        self._observer.update(measurements, before, levels)
+        if self.conformal is not None:
+            realised = self._inside(self._observer.zones(measurements) - REFERENCE, before)
+            self.conformal.update(realised, before.occupied[0])
+
+    def _inside(self, zone: FloatArray, ahead: Ahead) -> FloatArray:
+        """Distance from the lower edge of the band of the first step, positive inside, shape (n_zone,) [K].
+
+        What machines that heat can do about: not from the upper one.
+        """
+        return np.asarray(zone[: len(self.model.box.zones)] - (ahead.lower[0] - REFERENCE))
+
+    def _decided(self, ahead: Ahead) -> StageSolution | None:
+        """Plan, with the first steps of machines in duty whole."""
+        count, m = len(ahead.outdoor), len(self.model.maps)
+        low, high = np.zeros((count, m)), np.ones((count, m))
+        best: StageSolution | None = None
+        whole = [k for k, found in enumerate(self.model.maps) if found.operation == "duty"]
+        for k in whole:
+            choices = []
+            for on in self._possible(k):
+                steps, fixed = self._block(k, on), (low.copy(), high.copy())
+                fixed[0][:steps, k] = fixed[1][:steps, k] = float(on)
+                found = self._solve(ahead, fixed)
+                if found is not None:
+                    choices.append((found.cost / SCALE + self._starting(k, on, found, steps), on, steps, found))
+            if not choices:
+                return None
+            _, on, steps, best = min(choices, key=lambda c: c[0])
+            low[:1, k] = high[:1, k] = float(on)
+        return best if whole else self._solve(ahead, (low, high))
+
+    def _possible(self, k: int) -> tuple[bool, ...]:
+        """Whether a machine may be on or off next, by run times and the limit of starts."""
+        runs, now = self._runs[k], len(self.back_offs)
+        while runs.starts and runs.starts[0] <= now - self._day:
+            runs.starts.popleft()
+        if runs.since < self._hold:
+            return (runs.on,)
+        return (False,) if not runs.on and len(runs.starts) >= self.settings.starts else (True, False)
+
+    def _block(self, k: int, on: bool) -> int:
+        """Steps that a choice holds: the shortest run or rest where it switches, what is left of it, else one."""
+        runs = self._runs[k]
+        if on != runs.on:
+            return self._hold if on else 1
+        return max(self._hold - runs.since, 1)
+
+    def _starting(self, k: int, on: bool, found: StageSolution, steps: int) -> float:
+        """What starts cost that follow from a choice [currency].
+
+        A machine that is off and will run later starts once either way. One that has run n steps shares its start among
+        them: another step makes that c / n cheaper, which is what an end of the run forgoes.
+        """
+        runs, limit = self._runs[k], self.settings.starts
+        price = self.settings.start_price * limit / max(limit - len(runs.starts), 1e-3)
+        if on:
+            return 0.0 if runs.on else price
+        later = float(found.decisions[steps:, k].sum())
+        if later <= _HALF:
+            return 0.0
+        return price / max(runs.since, 1) if runs.on else price
+
+    def _solve(self, ahead: Ahead, ends: tuple[FloatArray, FloatArray]) -> StageSolution | None:
+        """Plan within ends of the decisions; they are then duties and loads themselves."""
+        state, solver = self._observer.state, self._solver
+        if solver is None:
+            return None
+        data = self._problem.data(state, ahead, self.back_off, self.settings.comfort_price, ends)
+        guess = np.full((len(ahead.outdoor), len(self.model.maps)), _HALF)
+        if self._plan is not None:
+            guess = self._plan.shifted()[1]
+        found = solver.solve(data, self._problem.stage.follow(data, guess), guess)
+        if found.status is Status.FAILED:
+            return None
+        chosen = ends[0] + (ends[1] - ends[0]) * np.clip(found.decisions, 0.0, 1.0)
+        return replace(found, decisions=chosen)
+
+    def _by_rule(self, measurements: Measurements, ahead: Ahead) -> FloatArray:
+        """Levels without a plan: full where a zone is too cold, else none."""
+        inside = self._inside(self._observer.zones(measurements) - REFERENCE, ahead)
+        served = [[zone in found.machine.serves for zone in self.model.box.zones] for found in self.model.maps]
+        return np.array([float((inside[np.array(mine)] < self.back_off).any()) for mine in served])
+
+    def _note(self, levels: FloatArray) -> None:
+        """Write down which machines run."""
+        now = len(self.back_offs)
+        for runs, found, level in zip(self._runs, self.model.maps, levels, strict=True):
+            if found.operation != "duty":
+                continue
+            on = bool(level > _HALF)
+            if on and not runs.on:
+                runs.starts.append(now)
+            runs.since = 1 if on != runs.on else runs.since + 1
+            runs.on = on
+
+    def _values(self, levels: FloatArray, solution: StageSolution | None, ahead: Ahead) -> dict[str, float]:
+        """Values of the actuators for levels."""
+        zone = self._observer.state if solution is None else 0.5 * (solution.states[0] + solution.states[1])
+        return {
+            found.machine.name: self._value(found, float(level), zone, ahead)
+            for found, level in zip(self.model.maps, levels, strict=True)
+        }
+
+    def _value(self, found: MachineMap, level: float, zone: FloatArray, ahead: Ahead) -> float:
+        """Value of an actuator for a level: a setpoint follows the expected air of its zone."""
+        actuator = self._actuators[found.machine.name]
+        low, high = actuator.lowest, actuator.highest
+        if found.operation == "setpoint":
+            served = [k for k, name in enumerate(self.model.box.zones) if name in found.machine.serves]
+            idle, full = found.above
+            value = float(zone[served].mean()) + REFERENCE + idle + level * (full - idle)
+            # a thermostat holds what it is told: told the edge it keeps the band where the model is wrong, at no other cost
+            edge = float(ahead.lower[0, served].max()) + max(self.back_off, 0.0)
+            return float(np.clip(edge if level <= _IDLE else max(value, edge), low, high))
+        if found.operation == "duty":
+            return high if level > _HALF else low
+        value = low + level * (high - low)
+        if actuator.minimum is not None and value < actuator.minimum:
+            return actuator.minimum if value > 0.5 * (low + actuator.minimum) else low
+        return float(np.clip(value, low, high))
+
+    def _powers(self, solution: StageSolution, ahead: Ahead) -> FloatArray:
+        """Expected electricity and other carriers, shape (N, 2) [W]."""
+        emitter = REFERENCE + solution.states[:-1] @ self.model.box.emitter_weights
+        powers = np.zeros((len(solution.decisions), 2))
+        for carrier, base in self.model.base.items():
+            powers[:, int(carrier != "electricity")] += base
+        for k, found in enumerate(self.model.maps):
+            for carrier, curve in found.powers.items():
+                value: Any = found.at(curve, solution.decisions[:, k], ahead.outdoor, emitter[:, k])
+                powers[:, int(carrier != "electricity")] += value
+        return powers
+

@@ -1,0 +1,98 @@
+"""State of an identified plant from what is measured: the steady Kalman filter of its grey box."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from calibration.estimation.state_space import REFERENCE
+from calibration.grey_box.fit import steady_gain
+from calibration.grey_box.network import NODES
+from mpc.control.identified.problem import Ahead
+from mpc.identify.model import PlantModel
+from mpc.loop.plant import Measurements
+from thermal._types import FloatArray
+from thermal.case.points import OUTDOOR_TEMPERATURE, ZONE_TEMPERATURE
+
+
+class GreyBoxObserver:
+    """Predicts nodes and unmeasured heat, and corrects them by the zones' temperatures.
+
+    Parameters
+    ----------
+    model : PlantModel
+        Identified.
+    """
+
+    def __init__(self, model: PlantModel) -> None:
+        self.model, self._whole = model, model.box.disturbed(model.step)
+        self._gain, _ = steady_gain(model.box, model.step)
+        self._matrix = self._whole.dense()
+        self._columns = [f"{zone}/{ZONE_TEMPERATURE}" for zone in model.box.zones]
+        self.state: FloatArray = np.zeros(0)
+
+    def zones(self, measurements: Measurements) -> FloatArray:
+        """Measured temperatures, shape (n_zone,) [K]; NaN where missing.
+
+        Parameters
+        ----------
+        measurements : Measurements
+            Of the last step.
+        """
+        return np.array([measurements[c] if c in measurements else np.nan for c in self._columns])
+
+    def start(self, measurements: Measurements, outdoor: float) -> None:
+        """Begin at rest: nodes at the temperatures that the air would hold them at.
+
+        Parameters
+        ----------
+        measurements : Measurements
+            Before the first step.
+        outdoor : float
+            Temperature of outdoor air [K].
+        """
+        box = self.model.box
+        zone = np.nan_to_num(self.zones(measurements), nan=REFERENCE) - REFERENCE
+        inner, outer = (np.exp(box.parts[f"conductance {link}"]) for link in ("air envelope", "envelope out"))
+        envelope = (inner * zone + outer * (outdoor - REFERENCE)) / (inner + outer)
+        self.state = np.concatenate([*[zone] * (len(NODES) - 1), envelope, np.zeros(len(zone))])
+
+    def update(self, measurements: Measurements, before: Ahead, levels: FloatArray) -> FloatArray:
+        """Take the step that has just ended.
+
+        Parameters
+        ----------
+        measurements : Measurements
+            Of that step.
+        before : Ahead
+            Whose first row was forecast for it.
+        levels : ndarray, shape (n_machine,)
+            Duties and loads that were set [-].
+
+        Returns
+        -------
+        ndarray, shape (n_zone,)
+            Innovations: measured less predicted [K]; NaN where missing.
+        """
+        model, space = self.model, self._whole.space
+        outdoor = _first(measurements, OUTDOOR_TEMPERATURE, float(before.outdoor[0]))
+        emitter = REFERENCE + self.state[: space.order] @ model.box.emitter_weights
+        heat = np.empty(len(model.maps))
+        for k, found in enumerate(model.maps):
+            told = measurements[found.machine.heat] if found.machine.heat in measurements else np.nan
+            modelled = found.at(found.heat, levels[k], outdoor, emitter[k])
+            heat[k] = told if np.isfinite(told) else modelled
+        given = model.box.delivered(heat, np.asarray(outdoor))
+        u = np.concatenate([[outdoor - REFERENCE], before.sun[0], given, before.gain[0]])
+        error = self.zones(measurements) - REFERENCE - self._whole.observation @ self.state - space.feedthrough @ u
+        corrected = self.state + self._gain @ np.nan_to_num(error)
+        self.state = self._matrix @ corrected
+        self.state[: space.order] += space.drive @ u
+        return np.asarray(error)
+
+
+def _first(measurements: Measurements, point: str, other: float) -> float:
+    """Value of the first column of a point, where there is one."""
+    for column in measurements.columns:
+        if column.rpartition("/")[2] == point and np.isfinite(measurements[column]):
+            return measurements[column]
+    return other

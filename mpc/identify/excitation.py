@@ -1,0 +1,146 @@
+"""An excitation that is safe to run on people: random levels within the comfort bands, and back to the plant outside."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mpc.identify.machines import Machine
+from mpc.loop.plant import Measurements
+from mpc.scenario.forecast import Forecast
+from thermal.case.points import ZONE_TEMPERATURE
+
+
+@dataclass(frozen=True)
+class ExcitationSettings:
+    """Choices of an excitation.
+
+    Parameters
+    ----------
+    hold : tuple of float
+        Shortest and longest time that a level is held [s]: several minutes of a machine's start up, and times over
+        which a floor answers.
+    ahead : tuple of float
+        How long before it holds a lower and an upper edge count [s]: a heated floor warms in hours, and gives its heat
+        off over half a day.
+    guard : tuple of float
+        Distance from the lower and from the upper edge at which the plant gets a machine back that drives there [K];
+        the upper one is larger, as a floor goes on to give heat.
+    back : float
+        Shortest time that the plant then keeps them [s].
+    part_load : float
+        Share of the levels of a machine that lie between off and full load [-].
+    seed : int
+        Of the random levels.
+    """
+
+    hold: tuple[float, float] = (1800.0, 10_800.0)
+    ahead: tuple[float, float] = (10_800.0, 43_200.0)
+    guard: tuple[float, float] = (0.2, 1.0)
+    back: float = 3600.0
+    part_load: float = 0.35
+    seed: int = 0
+
+
+class Excitation:
+    """Sets machines to random levels that are held for random times, more heat the colder their zones are in the band.
+
+    A pseudo-random sequence (Ljung 1999, System Identification, ch. 13.3) of levels rather than of two values, as maps
+    are to be told from it too: off, full load and, where the actuator takes them, loads in between; setpoints anywhere
+    within the band of their zone. Once a zone of a machine is nearer to an edge of its band than the guard, on the side
+    that the machine drives it to, the plant's own control has the machine.
+
+    Parameters
+    ----------
+    machines : sequence of Machine
+        What is set.
+    step : float
+        Control step [s].
+    settings : ExcitationSettings, optional
+        Choices.
+    """
+
+    def __init__(self, machines: Sequence[Machine], step: float, settings: ExcitationSettings | None = None) -> None:
+        self.machines, self.step_seconds, self.settings = machines, step, settings or ExcitationSettings()
+        self._random = np.random.default_rng(self.settings.seed)
+        self._value = dict.fromkeys((m.name for m in machines), np.nan)
+        self._until = dict.fromkeys((m.name for m in machines), -1)
+        self._back = dict.fromkeys((m.name for m in machines), -1)
+        self._count = 0
+        self.handed_back = 0
+
+    def step(self, measurements: Measurements, forecast: Forecast | None) -> Mapping[str, float]:
+        """Choose levels, or nothing for machines that the plant keeps.
+
+        Parameters
+        ----------
+        measurements : Measurements
+            Zone temperatures count [K].
+        forecast : Forecast or None
+            Comfort bands ahead count [K].
+        """
+        k, chosen = self._count, dict[str, float]()
+        self._count += 1
+        for machine in self.machines:
+            place = self._place(machine, measurements, forecast)
+            value = self._value[machine.name]
+            if self._unsafe(machine, place, value):
+                self._back[machine.name] = k + round(self.settings.back / self.step_seconds)
+            if k < self._back[machine.name] or place is None:
+                self.handed_back += 1
+                self._until[machine.name] = -1
+                self._value[machine.name] = np.nan
+                continue
+            if k >= self._until[machine.name]:
+                self._draw(machine, place, k)
+            chosen[machine.name] = self._value[machine.name]
+        return chosen
+
+    def _place(
+        self, machine: Machine, measurements: Measurements, forecast: Forecast | None
+    ) -> tuple[float, float, float, float] | None:
+        """Coldest and warmest distance of the served zones from the lower and upper edges, and the edges [K]."""
+        if forecast is None:
+            return None
+        soon, later = (max(round(s / self.step_seconds), 1) for s in self.settings.ahead)
+        found = []
+        for zone in machine.serves:
+            name = f"{zone}/{ZONE_TEMPERATURE}"
+            if name not in measurements or not np.isfinite(measurements[name]):
+                return None
+            low = float(forecast.table[f"{zone}/comfort_lower_temperature"].iloc[:soon].max())
+            high = float(forecast.table[f"{zone}/comfort_upper_temperature"].iloc[:later].min())
+            found.append((measurements[name] - low, high - measurements[name], low, high))
+        below, above, lows, highs = zip(*found, strict=True)
+        return min(below), min(above), max(lows), min(highs)
+
+    def _unsafe(self, machine: Machine, place: tuple[float, float, float, float] | None, value: float) -> bool:
+        """Whether a zone is at an edge and the level drives it on; setpoints lie within the band anyhow."""
+        if place is None or machine.role == "setpoint":
+            return False
+        full = value > 0.5 * (machine.actuator.lowest + machine.actuator.highest)
+        cold, warm = self.settings.guard
+        return place[1] < warm if full else place[0] < cold
+
+    def _draw(self, machine: Machine, place: tuple[float, float, float, float], k: int) -> None:
+        """Draw a level and how long it is held."""
+        random, actuator = self._random, machine.actuator
+        shortest, longest = (max(round(s / self.step_seconds), 1) for s in self.settings.hold)
+        self._until[machine.name] = k + int(random.integers(shortest, longest + 1))
+        low, high = actuator.lowest, actuator.highest
+        if machine.role == "setpoint":
+            lower, upper = place[2] + self.settings.guard[0], place[3] - self.settings.guard[0]
+            value = random.uniform(min(lower, upper), max(lower, upper))
+            self._value[machine.name] = float(np.clip(value, low, high))
+            return
+        room = max(place[0] + place[1] - self.settings.guard[1], 0.1)
+        share = float(np.clip(0.9 - 0.8 * place[0] / room, 0.05, 0.95))
+        least = actuator.minimum if actuator.minimum is not None else low + 0.2 * (high - low)
+        if random.random() > share:
+            self._value[machine.name] = low
+        elif actuator.kind != "on_off" and random.random() < self.settings.part_load:
+            self._value[machine.name] = float(random.uniform(least, high))
+        else:
+            self._value[machine.name] = high

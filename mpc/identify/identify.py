@@ -1,0 +1,142 @@
+"""From telemetry to a model: loads, maps of the machines, grey box, and how well it predicts days it has not seen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibration.estimation.state_space import REFERENCE
+from calibration.grey_box.fit import GreyBoxData, fit_grey_box, follow
+from calibration.grey_box.judge import LeadError, judge
+from calibration.grey_box.network import GreyBox
+from mpc.errors import PlantError
+from mpc.identify.machines import Machine
+from mpc.identify.maps import EMITTER, Loads, map_machines
+from mpc.identify.model import PlantModel
+from mpc.identify.telemetry import CARRIERS, SET, PlantTelemetry
+from thermal._types import FloatArray
+from thermal.case.points import ZONE_TEMPERATURE
+
+Progress = Callable[[str, int, int], None]
+
+#: Share of the days that is held out for judging, two at least [-]; shortest telemetry for that [d], and for a fit.
+_HELD_OUT, _FEWEST = 0.25, 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """A model and what is known of it.
+
+    Parameters
+    ----------
+    model : PlantModel
+        Fitted to all telemetry.
+    telemetry : PlantTelemetry
+        That it was fitted to.
+    data : GreyBoxData
+        Its inputs and zone temperatures.
+    loads : Loads
+        Loads of the machines.
+    errors : tuple of LeadError
+        On the last days, of a fit to the days before.
+    split : int
+        First held-out step.
+    notes : tuple of str
+        What was assumed, in words.
+    """
+
+    model: PlantModel
+    telemetry: PlantTelemetry
+    data: GreyBoxData
+    loads: Loads
+    errors: tuple[LeadError, ...]
+    split: int
+    notes: tuple[str, ...]
+
+
+def identify(telemetry: PlantTelemetry, machines: Sequence[Machine], progress: Progress | None = None) -> Identified:
+    """Identify a plant.
+
+    Parameters
+    ----------
+    telemetry : PlantTelemetry
+        Of its own control, or of an excitation.
+    machines : sequence of Machine
+        Actuators that are to be controlled.
+    progress : callable, optional
+        Called with stage, done, total.
+
+    Raises
+    ------
+    PlantError
+        When there is too little telemetry, or nothing tells what the machines did.
+    """
+    days = len(telemetry.frame) * telemetry.step / 86_400.0
+    PlantError.unless(days >= _FEWEST, "identify", f"{_FEWEST:g} days of telemetry at least", f"{days:.3g}")
+    data = _data(telemetry, machines)
+    suns = tuple(telemetry.suns)
+    serves = {machine.name: machine.serves for machine in machines}
+    metered = tuple(bool(machine.heat) for machine in machines)
+    start = GreyBox.start(telemetry.site.areas, suns, serves, metered)
+    held = round(max(2.0, _HELD_OUT * days) * 86_400.0 / telemetry.step)
+    split = len(data.zone) - held
+    begin, errors = start, list[LeadError]()
+    if split * telemetry.step >= _FEWEST * 86_400.0:
+        begin = fit_grey_box(start, data.rows(0, split), progress)
+        errors = judge(begin, data, split)
+    box = fit_grey_box(begin, data, progress)
+    loads = _loads(telemetry, machines, data, box)
+    signals = data.heat
+    bought = {name: telemetry.column(name) for name in CARRIERS if name in telemetry.frame}
+    maps, base = map_machines(machines, loads, signals, bought, _above(telemetry, machines))
+    notes = _notes(telemetry, machines, suns)
+    model = PlantModel(telemetry.site.name, telemetry.step, box, maps, base)
+    return Identified(model, telemetry, data, loads, tuple(errors), split, notes)
+
+
+def _data(telemetry: PlantTelemetry, machines: Sequence[Machine]) -> GreyBoxData:
+    """Inputs of the grey box."""
+    sun = np.column_stack([*telemetry.suns.values()]) if telemetry.suns else np.empty((len(telemetry.frame), 0))
+    heat = np.column_stack([machine.signal(telemetry) for machine in machines])
+    return GreyBoxData(telemetry.step, telemetry.zone, telemetry.outdoor, sun, heat, telemetry.gain)
+
+
+def _loads(telemetry: PlantTelemetry, machines: Sequence[Machine], data: GreyBoxData, box: GreyBox) -> Loads:
+    """Loads, with the temperatures of the emitters as the grey box has them."""
+    states = follow(box, data).states[:-1]
+    level = np.column_stack([machine.level(telemetry) for machine in machines])
+    emitter = states[:, : box.capacity.size] @ box.emitter_weights + REFERENCE
+    first = round(86_400.0 / telemetry.step)  # the filter's start
+    emitter[:first] = emitter[first : 2 * first].mean(axis=0) if len(emitter) > 2 * first else EMITTER
+    return Loads(level, data.outdoor, emitter)
+
+
+def _above(telemetry: PlantTelemetry, machines: Sequence[Machine]) -> FloatArray:
+    """How far setpoints lie above the air of their zones, shape (n_time, n_machine) [K]."""
+    columns = []
+    for machine in machines:
+        set_to = telemetry.frame.get(f"{SET}{machine.name}")
+        measured = telemetry.frame.get(machine.name)
+        value = set_to if set_to is not None and set_to.notna().any() else measured
+        zone = telemetry.frame[f"{machine.serves[0]}/{ZONE_TEMPERATURE}"]
+        known = machine.role == "setpoint" and value is not None
+        columns.append((value - zone).to_numpy(dtype=float) if known else np.full(len(zone), np.nan))
+    return np.column_stack(columns)
+
+
+def _notes(telemetry: PlantTelemetry, machines: Sequence[Machine], suns: Sequence[str]) -> tuple[str, ...]:
+    notes = []
+    for machine in machines:
+        if not machine.heat:
+            notes.append(f"no heat of {machine.name} is measured: it is counted in watts of what is bought at 7 degC")
+        told = telemetry.frame.get(f"{SET}{machine.name}")
+        if machine.role == "machine" and (told is None or told.isna().all()):
+            notes.append(f"no command of {machine.name} was recorded: its load is the share of the largest heat seen")
+    if not suns:
+        notes.append("no irradiance is known: the sun is part of the unmeasured heat")
+    if not telemetry.gain.any():
+        notes.append("no people are forecast: their heat is part of the unmeasured heat")
+    return tuple(notes)
+

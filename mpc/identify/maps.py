@@ -1,0 +1,307 @@
+"""Maps of machines by regression: heat and what is bought, by command, outdoor air and the emitter's temperature."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal, Self
+
+import numpy as np
+
+from mpc.errors import PlantError
+from mpc.identify.machines import Machine
+from thermal._types import FloatArray
+
+#: How a machine is run: whole or not at all for parts of the time, at any part load, or by a zone's own controller.
+Operation = Literal["duty", "modulated", "setpoint"]
+
+#: Outdoor air and emitter that coefficients are told at [K], and changes that slopes are for [K]: 7 degC is where heat
+#: pumps are rated (EN 14511).
+OUTDOOR, EMITTER, PER = 280.15, 303.15, 10.0
+
+#: Spread of a temperature below which nothing is said of its effect [K].
+_TOLD = 0.5
+
+#: Levels of the command that count as one [-].
+_SAME = 0.05
+
+#: Part loads at which efficiency is compared with that of full load [-], and what full load may be worse [-].
+_PARTS, _WORSE = (0.3, 0.5, 0.7), 0.02
+
+#: Steps over which errors of a regression may hang together (Newey and West 1987, doi:10.2307/1913610): an hour.
+_LAGS = 4
+
+#: Half width of intervals in standard errors: 95 % of a normal distribution.
+_WIDE = 1.96
+
+
+@dataclass(frozen=True)
+class Curve:
+    """What a machine gives or takes over its features: ``Σ c_i φ_i``.
+
+    ``standing`` is 1 at any load above 0, ``command`` the load u from 0 to 1, ``command^2`` its square, ``outdoor`` and
+    ``emitter`` u times the difference from 7 and 30 degC over 10 K.
+
+    Parameters
+    ----------
+    coefficients, deviations : mapping of str to float
+        By feature, and their standard errors, robust against autocorrelation [W].
+    """
+
+    coefficients: Mapping[str, float]
+    deviations: Mapping[str, float]
+
+    def __call__(self, on: Any, u: Any, outdoor: Any, emitter: Any) -> Any:
+        """Evaluate, with numbers, arrays or symbols [W].
+
+        Parameters
+        ----------
+        on, u : number, array or symbol
+            Whether it runs, and its load [-].
+        outdoor, emitter : number, array or symbol
+            Temperatures [K].
+        """
+        features = features_of(on, u, outdoor, emitter)
+        return sum((c * features[name] for name, c in self.coefficients.items()), 0.0 * u)
+
+    def without_standing(self) -> Self:
+        """Leave the standing part out, as it is where a machine never runs at part load."""
+        return replace(self, coefficients={k: v for k, v in self.coefficients.items() if k != "standing"})
+
+
+def features_of(on: Any, u: Any, outdoor: Any, emitter: Any) -> dict[str, Any]:
+    """Features of a load, see `Curve`.
+
+    Parameters
+    ----------
+    on, u : number, array or symbol
+        Whether it runs, and its load [-].
+    outdoor, emitter : number, array or symbol
+        Temperatures [K].
+    """
+    return {
+        "standing": on,
+        "command": u,
+        "command^2": u * u,
+        "outdoor": u * (outdoor - OUTDOOR) / PER,
+        "emitter": u * (emitter - EMITTER) / PER,
+    }
+
+
+@dataclass(frozen=True)
+class MachineMap:
+    """What a machine does.
+
+    Parameters
+    ----------
+    machine : Machine
+        Its actuator and sensors.
+    operation : str
+        ``duty``, ``modulated`` or ``setpoint``.
+    heat : Curve
+        Heat, or what stands for it where it is not measured [W].
+    powers : mapping of str to Curve
+        Of each kind that is bought [W].
+    above : tuple of float
+        Of a setpoint: how far it lies above the zone's air at no load and at full load [K].
+    """
+
+    machine: Machine
+    operation: Operation
+    heat: Curve
+    powers: Mapping[str, Curve]
+    above: tuple[float, float] = (0.0, 0.0)
+
+    def at(self, curve: Curve, u: Any, outdoor: Any, emitter: Any) -> Any:
+        """Evaluate at a duty or load, for a controller: duty is a share of the time at full load [W].
+
+        Parameters
+        ----------
+        curve : Curve
+            Of heat or power.
+        u : number, array or symbol
+            Duty or load [-].
+        outdoor, emitter : number, array or symbol
+            Temperatures [K].
+        """
+        if self.operation == "duty":
+            return u * curve(1.0, 1.0, outdoor, emitter)
+        return curve.without_standing()(0.0, u, outdoor, emitter)
+
+    @property
+    def standing(self) -> float:
+        """Power at any speed above zero, of all that is bought [W]."""
+        return float(sum(curve.coefficients.get("standing", 0.0) for curve in self.powers.values()))
+
+    def efficiency(self, u: float, outdoor: float = OUTDOOR, emitter: float = EMITTER) -> float:
+        """Heat over what is bought [-].
+
+        Parameters
+        ----------
+        u : float
+            Load above 0 [-].
+        outdoor, emitter : float
+            Temperatures [K].
+        """
+        bought = sum(curve(1.0, u, outdoor, emitter) for curve in self.powers.values())
+        return float(self.heat(1.0, u, outdoor, emitter) / max(bought, 1e-6))
+
+
+@dataclass(frozen=True, eq=False)
+class Loads:
+    """Loads of the machines and temperatures that their maps hang on, one row a step.
+
+    Parameters
+    ----------
+    level : ndarray, shape (n_time, n_machine)
+        Loads [-]; NaN while unknown.
+    outdoor : ndarray, shape (n_time,)
+        Outdoor air [K].
+    emitter : ndarray, shape (n_time, n_machine)
+        Temperature of what each machine heats [K]; `EMITTER` where it is not known.
+    """
+
+    level: FloatArray
+    outdoor: FloatArray
+    emitter: FloatArray
+
+    @property
+    def known(self) -> FloatArray:
+        """Steps whose loads are all known, shape (n_time,)."""
+        return np.isfinite(self.level).all(axis=1)
+
+    def features(self, m: int) -> dict[str, FloatArray]:
+        """Features of a machine that its loads tell apart.
+
+        Parameters
+        ----------
+        m : int
+            Which machine.
+        """
+        rows = self.known
+        u, emitter, outdoor = self.level[rows, m], self.emitter[rows, m], self.outdoor[rows]
+        found = features_of((u > 1e-6).astype(float), u, outdoor, emitter)
+        levels = np.unique(np.round(u[u > 1e-6] / _SAME))
+        running = u > 1e-6
+        left_out = {
+            "standing": len(levels) < 2,
+            "command^2": len(levels) < 3,
+            "outdoor": running.sum() < 8 or np.std(outdoor[running]) < _TOLD,
+            "emitter": running.sum() < 8 or np.std(emitter[running]) < _TOLD,
+        }
+        return {name: values for name, values in found.items() if not left_out.get(name, False)}
+
+
+def regress(loads: Loads, values: FloatArray, machines: Sequence[int]) -> tuple[list[Curve], float]:
+    """Regress what is measured on the features of machines, a constant beside them.
+
+    Parameters
+    ----------
+    loads : Loads
+        Of all machines.
+    values : ndarray, shape (n_time,)
+        Measured [W].
+    machines : sequence of int
+        Which machines have a part in it.
+
+    Returns
+    -------
+    list of Curve
+        One a machine.
+    float
+        The constant [W].
+
+    Raises
+    ------
+    PlantError
+        When there are too few steps with known loads.
+    """
+    from statsmodels.regression.linear_model import OLS
+
+    rows = loads.known & np.isfinite(values)
+    columns, owners = [np.ones(int(rows.sum()))], [(-1, "constant")]
+    for m in machines:
+        for name, feature in loads.features(m).items():
+            columns.append(feature[rows[loads.known]])
+            owners.append((m, name))
+    PlantError.unless(
+        rows.sum() > 4 * len(columns), "component maps", f"{4 * len(columns)} steps with known commands", int(rows.sum()),
+        "give more days, or telemetry whose commands are recorded",
+    )  # fmt: skip
+    design = np.column_stack(columns)
+    found = OLS(values[rows], design).fit(cov_type="HAC", cov_kwds={"maxlags": _LAGS})
+    parts = [
+        {name: (float(found.params[k]), float(found.bse[k])) for k, (owner, name) in enumerate(owners) if owner == m}
+        for m in machines
+    ]
+    curves = [Curve({n: c for n, (c, _) in p.items()}, {n: d for n, (_, d) in p.items()}) for p in parts]
+    return curves, float(found.params[0])
+
+
+def map_machines(
+    machines: Sequence[Machine], loads: Loads, signals: FloatArray, bought: Mapping[str, FloatArray], above: FloatArray
+) -> tuple[tuple[MachineMap, ...], dict[str, float]]:
+    """Make the map of each machine.
+
+    Parameters
+    ----------
+    machines : sequence of Machine
+        Of the plant.
+    loads : Loads
+        Their loads.
+    signals : ndarray, shape (n_time, n_machine)
+        Heat, or what is bought in its place [W].
+    bought : mapping of str to ndarray
+        Power of each kind that the plant buys [W].
+    above : ndarray, shape (n_time, n_machine)
+        How far setpoints lie above the air of their zones [K]; NaN of machines.
+
+    Returns
+    -------
+    tuple of MachineMap
+        In the order of the machines.
+    dict of str to float
+        Power of each kind that no machine explains [W].
+    """
+    everyone = range(len(machines))
+    heats = [regress(loads, signals[:, m], [m])[0][0] for m in everyone]
+    powers = {kind: regress(loads, values, everyone) for kind, values in bought.items() if np.ptp(values) > 1.0}
+    made = []
+    for m, machine in enumerate(machines):
+        found = MachineMap(machine, "setpoint", heats[m], {kind: curves[m] for kind, (curves, _) in powers.items()})
+        if machine.role == "machine":
+            made.append(replace(found, operation=_operation(found)))
+        else:
+            made.append(replace(found, above=_local(loads.level[:, m], above[:, m])))
+    return tuple(made), {kind: base for kind, (_, base) in powers.items()}
+
+
+def _operation(found: MachineMap) -> Operation:
+    """Full load for parts of the time where the machine is made for it, or where part load is not more efficient."""
+    if found.machine.actuator.kind != "continuous":
+        return "duty"
+    best = max(found.efficiency(u) for u in _PARTS)
+    return "duty" if found.efficiency(1.0) >= (1.0 - _WORSE) * best and found.standing > 0.0 else "modulated"
+
+
+def _local(level: FloatArray, above: FloatArray) -> tuple[float, float]:
+    """How far a setpoint lies above its zone at no load and at full load, by a line through the steps in between."""
+    between = np.isfinite(above) & (level > _SAME) & (level < 1.0 - _SAME)
+    if between.sum() < 8 or np.ptp(level[between]) < 0.2:
+        return 0.0, 1.0
+    slope, zero = np.polyfit(level[between], above[between], 1)
+    return float(zero), float(zero + max(slope, 0.0))
+
+
+def interval_of(curve: Curve, feature: str) -> tuple[float, float]:
+    """Ends of the 95 % interval of a coefficient [W].
+
+    Parameters
+    ----------
+    curve : Curve
+        Of a machine.
+    feature : str
+        Of the curve.
+    """
+    value, wide = curve.coefficients[feature], _WIDE * curve.deviations[feature]
+    return value - wide, value + wide

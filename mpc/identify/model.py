@@ -1,0 +1,113 @@
+"""A plant as a controller knows it: grey box and maps of the machines, in a folder of their own."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Self
+
+from calibration.errors import CalibrationError
+from calibration.grey_box.network import GreyBox
+from mpc.errors import ControlError, MpcError
+from mpc.identify.machines import Machine
+from mpc.identify.maps import Curve, MachineMap
+from mpc.loop.actuators import Actuator
+
+#: File of a model in its folder, and the version of its contents.
+FILE, FORMAT = "model.json", 1
+
+
+@dataclass(frozen=True, eq=False)
+class PlantModel:
+    """What was identified of a plant.
+
+    Parameters
+    ----------
+    name : str
+        Of the plant.
+    step : float
+        Control step that it was identified on [s].
+    box : GreyBox
+        Zones.
+    maps : tuple of MachineMap
+        Machines, in the order of the sources of the grey box.
+    base : mapping of str to float
+        Power of each kind that is bought whatever the machines do [W].
+    """
+
+    name: str
+    step: float
+    box: GreyBox
+    maps: tuple[MachineMap, ...]
+    base: Mapping[str, float] = field(default_factory=dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Values for a file."""
+        maps = [
+            {
+                "machine": {**{k: v for k, v in vars(m.machine).items() if k != "actuator"},
+                            "actuator": asdict(m.machine.actuator)},
+                "operation": m.operation, "heat": asdict(m.heat), "above": list(m.above),
+                "powers": {kind: asdict(curve) for kind, curve in m.powers.items()},
+            }
+            for m in self.maps
+        ]  # fmt: skip
+        return {
+            "format": FORMAT, "name": self.name, "step": self.step, "grey_box": self.box.to_dict(), "machines": maps,
+            "base": dict(self.base),
+        }  # fmt: skip
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Self:
+        """Make a model of what `to_dict` wrote.
+
+        Parameters
+        ----------
+        content : mapping
+            Of a file.
+
+        Raises
+        ------
+        ControlError
+            When something is missing, or does not fit.
+        """
+        where, expected = f"model: {FILE}", f"what `buildingmpc identify` writes, format {FORMAT}"
+        ControlError.unless(content.get("format") == FORMAT, where, expected, f"format {content.get('format')!r}")
+        try:
+            maps = tuple(_map_of(entry) for entry in content["machines"])
+            box = GreyBox.from_dict(content["grey_box"])
+            return cls(str(content["name"]), float(content["step"]), box, maps, dict(content["base"]))
+        except (KeyError, TypeError, ValueError, MpcError, CalibrationError) as error:
+            raise ControlError(where, expected, f"{type(error).__name__}: {error}") from error
+
+
+def _map_of(entry: Mapping[str, Any]) -> MachineMap:
+    told = entry["machine"]
+    machine = Machine(Actuator(**told["actuator"]), told["role"], tuple(told["serves"]), told["heat"], told["power"])
+    powers = {kind: Curve(**curve) for kind, curve in entry["powers"].items()}
+    return MachineMap(machine, entry["operation"], Curve(**entry["heat"]), powers, tuple(entry["above"]))
+
+
+def read_model(folder: Path) -> PlantModel:
+    """Read a model's folder.
+
+    Parameters
+    ----------
+    folder : Path
+        That ``buildingmpc identify`` wrote, or its ``model.json``.
+
+    Raises
+    ------
+    ControlError
+        When it is none.
+    """
+    file = folder / FILE if folder.is_dir() else folder
+    try:
+        content = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        expected = f"a folder with {FILE}, as `buildingmpc identify` writes it"
+        raise ControlError(f"--model {folder.name}", expected, " ".join(str(error).split())) from error
+    ControlError.unless(isinstance(content, Mapping), f"model: {FILE}", "a mapping", type(content).__name__)
+    return PlantModel.from_dict(content)

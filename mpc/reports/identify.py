@@ -1,0 +1,201 @@
+"""What an identification leaves behind: the model, its telemetry, how well it predicts, and a page."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from calibration.results import Content, write_results
+from mpc.identify.identify import Identified
+from mpc.identify.maps import EMITTER, OUTDOOR, interval_of
+from mpc.identify.model import FILE, PlantModel
+from mpc.kpi.kpis import Kpis, measure_kpis
+from mpc.reports.figures.identify import course_pictures, error_pictures, map_pictures
+from mpc.reports.page import clock, duration, listed, percent, render, significant
+from mpc.studies.described import Experiment
+
+#: What terms of a map are called.
+_TERMS = {
+    "standing": "at any speed above zero", "command": "at full load", "command^2": "square of the load",
+    "outdoor": "a 10 K warmer outdoor air", "emitter": "a 10 K warmer floor",
+}  # fmt: skip
+_OPERATION = {
+    "duty": "run at full load or not at all",
+    "modulated": "run at part load",
+    "setpoint": "run by the zone's own controller, by its setpoint",
+}
+
+
+def write_identified(
+    found: Identified, made: Experiment | None, out: str | Path, *, command: str = "", force: bool = False
+) -> Path:
+    """Write ``model.json``, ``identify.json``, ``telemetry.parquet`` and ``report.html``.
+
+    Parameters
+    ----------
+    found : Identified
+        Of `identify`.
+    made : Experiment or None
+        That led to it.
+    out : str or Path
+        Folder, made if need be.
+    command : str
+        That led to it, for the page.
+    force : bool
+        Replace earlier results.
+
+    Returns
+    -------
+    Path
+        The page.
+    """
+    files: dict[str, Content] = {
+        FILE: found.model.to_dict(),
+        "identify.json": identify_summary(found, made),
+        "telemetry.parquet": found.telemetry.to_frame(),
+        "report.html": render("identify", _content(found, made, command)),
+    }
+    return write_results(out, files, force) / "report.html"
+
+
+def experiment_kpis(made: Experiment) -> Kpis:
+    """Measure what an experiment cost and how comfortable it was.
+
+    Parameters
+    ----------
+    made : Experiment
+        Of a plant.
+    """
+    return measure_kpis(made.run.record, made.scenario, control_step=made.telemetry.step)
+
+
+def identify_summary(found: Identified, made: Experiment | None) -> dict[str, Any]:
+    """Contents of ``identify.json``.
+
+    Parameters
+    ----------
+    found : Identified
+        Of `identify`.
+    made : Experiment or None
+        That led to it.
+    """
+    index, box = found.telemetry.frame.index, found.model.box
+    return {
+        "plant": found.model.name, "start": index[0].isoformat(), "end": index[-1].isoformat(),
+        "held_out_from": index[found.split].isoformat(), "errors": [e.to_dict() for e in found.errors],
+        "machines": {
+            m.machine.name: {
+                "operation": m.operation, "standing_power": m.standing,
+                "efficiency": {"full": m.efficiency(1.0), "half": m.efficiency(0.5)},
+                "terms": [dict(zip(("what", "term", "value", "interval"), row[1:], strict=True)) for row in _terms(m)],
+            }
+            for m in found.model.maps
+        },
+        "time_constants_hours": (box.time_constants / 3600.0).tolist(), "heat_loss": box.heat_loss.tolist(),
+        "unmeasured_heat": box.disturbance.to_dict(), "notes": list(found.notes),
+        "experiment": None if made is None else {
+            "kpis": experiment_kpis(made).to_dict(), "handed_back": made.handed_back,
+        },
+    }  # fmt: skip
+
+
+def identify_verdict(found: Identified, made: Experiment | None) -> str:
+    """Say in plain words what is known of a plant.
+
+    Parameters
+    ----------
+    found : Identified
+        Of `identify`.
+    made : Experiment or None
+        That led to it.
+    """
+    steps = len(found.telemetry.frame)
+    text = f"From {duration(steps * found.telemetry.step)} of telemetry: "
+    if found.errors:
+        last = found.errors[-1]
+        best = min(last.persistence, last.arx)
+        word = "better" if last.grey_box < best else "no better"
+        text += (
+            f"the model predicts the zones {duration(last.lead)} ahead to {last.grey_box:.2f} K on days it has not seen, "
+            f"{word} than the best simple model ({best:.2f} K). "
+        )
+    else:
+        text += "too short to hold days out, so that nothing is known of its errors. "
+    for m in found.model.maps:
+        text += f"{m.machine.name} is to be {_OPERATION[m.operation]}"
+        if m.standing > 1.0:
+            text += f", as it draws {significant(m.standing, 2)} W at any speed"
+        text += ". "
+    if made is not None:
+        k = experiment_kpis(made)
+        text += (
+            f"The experiment spent {k.cost_tot * k.floor_area:.2f} {k.currency} on energy; zones were outside of their band "
+            f"by {significant(k.tdis_tot, 2)} K h on average, and the plant had its machines back for "
+            f"{percent(made.handed_back)} of the time."
+        )
+    return text.strip()
+
+
+def identify_rows(found: Identified) -> list[tuple[str, float, float, float]]:
+    """Rows of the table of errors.
+
+    Parameters
+    ----------
+    found : Identified
+        Of `identify`.
+    """
+    return [(duration(e.lead), e.grey_box, e.arx, e.persistence) for e in found.errors]
+
+
+def map_rows(model: PlantModel) -> list[list[str]]:
+    """Rows of the table of maps: machine, what, term, value and interval.
+
+    Parameters
+    ----------
+    model : PlantModel
+        Identified.
+    """
+    return [[name, what, term, f"{value:,.0f} W", f"{low:,.0f} to {high:,.0f} W"]
+            for m in model.maps for name, what, term, value, (low, high) in _terms(m)]  # fmt: skip
+
+
+def _terms(m: Any) -> list[tuple[str, str, str, float, tuple[float, float]]]:
+    """Machine, what, term, value and interval of each coefficient [W]."""
+    curves = {"heat" if m.machine.heat else "heat, in what is bought": m.heat, **m.powers}
+    return [
+        (m.machine.name, what.replace("_", " "), _TERMS[term], value, interval_of(curve, term))
+        for what, curve in curves.items()
+        for term, value in curve.coefficients.items()
+    ]
+
+
+def _content(found: Identified, made: Experiment | None, command: str) -> dict[str, Any]:
+    box, index = found.model.box, found.telemetry.frame.index
+    disturbance = box.disturbance
+    machines = [
+        (m.machine.name, _OPERATION[m.operation], listed(m.machine.serves) if len(m.machine.serves) < 5 else "all zones",
+         m.machine.heat or "not measured", significant(m.standing, 2),
+         significant(m.efficiency(1.0), 3), significant(m.efficiency(0.5), 3))
+        for m in found.model.maps
+    ]  # fmt: skip
+    zones = [
+        (zone, significant(box.heat_loss[k], 3), *(significant(box.capacity[n * len(box.zones) + k] / 3.6e6, 3) for n in range(4)))
+        for k, zone in enumerate(box.zones)
+    ]  # fmt: skip
+    cards = [(f"{e.grey_box:.2f} K", f"mean error {duration(e.lead)} ahead, days held out") for e in found.errors]
+    if made is not None:
+        k = experiment_kpis(made)
+        cards += [(f"{k.cost_tot * k.floor_area:,.2f} {k.currency}", "energy during the experiment"),
+                  (f"{significant(k.tdis_tot, 2)} K h", "outside of the comfort band, mean zone")]  # fmt: skip
+    return {
+        "title": f"Model of {found.model.name}", "verdict": identify_verdict(found, made), "cards": cards,
+        "subtitle": f"{clock(index[0])} to {clock(index[-1])}, held out from {clock(index[found.split])} on",
+        "errors": [[duration(e.lead), f"{e.grey_box:.3f}", f"{e.bias:+.3f}".replace("-", "−"), f"{e.arx:.3f}",
+                    f"{e.persistence:.3f}", str(e.count)] for e in found.errors],
+        "machines": machines, "maps": map_rows(found.model), "zones": zones, "notes": found.notes, "command": command,
+        "slowest": significant(float(np.max(box.time_constants)) / 3600.0, 3),
+        "unmeasured": significant(float(np.sqrt(np.mean(np.asarray(disturbance.deviation) ** 2))), 2),
+        "lasting": significant(disturbance.time_constant / 3600.0, 2),
+        "at": f"{OUTDOOR - 273.15:.0f} °C outdoors and {EMITTER - 273.15:.0f} °C of the floor",
+        "error_pictures": error_pictures(found), "map_pictures": map_pictures(found), "course": course_pictures(found),
+    }  # fmt: skip

@@ -1,0 +1,173 @@
+"""Plants to develop on: curves and prices by hand, and in EnergyPlus heat that arrives, and overwrites that reach."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from mpc.adapters.described.load import load_plant
+from mpc.errors import ControlError
+from mpc.identify.machines import Machine
+from mpc.loop.actuators import Actuator
+from mpc.loop.plant import Measurements, PointLayout
+from mpc.loop.run import run_closed_loop
+from mpc.scenario.forecast import Forecast
+from thermal.case.points import HEATING_POWER, ZONE_TEMPERATURE
+
+_WITHOUT = importlib.util.find_spec("pyenergyplus") is None
+
+
+def needs_energyplus(test: Callable[..., None]) -> Callable[..., None]:
+    """Skip a test where EnergyPlus is not installed."""
+    return pytest.mark.skipif(_WITHOUT, reason="needs the extra [energyplus]")(pytest.mark.energyplus(test))
+
+
+SPEED, CIRCULATOR = "heat_pump/compressor_speed", "floor/pump"
+
+
+@pytest.fixture(scope="module")
+def models(package: Callable[[str], ModuleType]) -> Callable[[str], ModuleType]:
+    package("energyplus_trials.frame")  # neighbours that the plants are made with
+    return lambda name: package(f"foreign_models.{name}")
+
+
+@pytest.fixture(scope="module")
+def made(models: Callable[[str], ModuleType], tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Any]:
+    folder = tmp_path_factory.mktemp("plants")
+
+    def run(name: str, controller: Any, steps: int) -> pd.DataFrame:
+        path, short = folder / name / "plant.yaml", {"start": "2023-01-09", "days": 2, "warm_up_days": 1}
+        if not path.exists():
+            models("plants").write_plant(name, folder)
+        with load_plant(path, changes={"period": short}) as plant:
+            return run_closed_loop(plant, controller, steps=steps).measurements
+
+    return run
+
+
+class Held:
+    """Actions of the control steps: what holds from each step on."""
+
+    def __init__(self, changes: dict[int, dict[str, float]]) -> None:
+        self.changes, self.count, self.now = changes, 0, dict[str, float]()
+
+    def step(self, measurements: Any, forecast: Forecast | None) -> dict[str, float]:
+        self.now = self.changes.get(self.count, self.now)
+        self.count += 1
+        return self.now
+
+
+def test_curves_of_a_heat_pump_follow_their_law(models: Callable[[str], ModuleType]) -> None:
+    machine = models("heat_pump").HeatPump(capacity=10_000.0, cop=4.0, standing=0.3)
+    capacity, per_heat = machine.curves().values()
+
+    def at(curve: np.ndarray, water: float, air: float) -> float:
+        return float(curve @ [1.0, water, water**2, air, air**2, water * air])
+
+    assert at(capacity, 45.0, -8.0) == pytest.approx(1.0 - 0.006 * 10.0 - 0.022 * 15.0)
+    # Carnot between 5 K above the water and 5 K below the air: 58 K over 313.15 + 10 K, beside 38 K over 313.15 K
+    assert at(per_heat, 45.0, -3.0) == pytest.approx((58.0 / 323.15) / (38.0 / 313.15), rel=0.01)
+    constant, factor, exponent = machine.part_load()
+    powers = [load * (constant + factor * load**exponent) for load in (0.5, 1.0)]
+    assert powers == pytest.approx([0.3 + 0.7 * 0.5, 1.0])
+
+
+def test_prices_are_drawn_from_their_seed(models: Callable[[str], ModuleType]) -> None:
+    drawn = models("prices").dynamic_prices("Etc/GMT+5")
+    again, other = (models("prices").dynamic_prices("Etc/GMT+5", seed) for seed in (20, 21))
+    price = drawn["dynamic"].to_numpy()
+    assert drawn.equals(again) and not drawn.equals(other)
+    assert drawn["timestamp"].iloc[0] == "2023-01-01T00:00:00-05:00" and len(drawn) == 366 * 24 + 24
+    by_hour = price[:8760].reshape(365, 24).mean(axis=0)
+    assert by_hour.argmax() == 18 and price.min() > 0.05 and 0.03 < price.std() < 0.06
+
+
+def test_a_clock_is_early_and_a_schedule_holds_its_hours(models: Callable[[str], ModuleType]) -> None:
+    office = [8 <= hour < 18 for hour in range(24)]
+    setpoints = models("thermostats").clock(office)
+    assert [hour for hour in range(24) if setpoints[hour] > 20.0] == list(range(6, 18))
+    fields = [line["field"] for line in models("objects").daily([1.0] * 8 + [2.0] * 16, [3.0] * 24)["data"]]
+    assert fields == ["Through: 12/31", "For: Weekdays", "Until: 8:00", 1.0, "Until: 24:00", 2.0,
+                      "For: AllOtherDays", "Until: 24:00", 3.0]  # fmt: skip
+
+
+def test_a_pi_gives_the_speed_that_the_coming_hours_ask_for(script: Callable[[str], ModuleType]) -> None:
+    stamps = pd.date_range("2023-01-09 04:15", periods=24, freq="15min", tz="Etc/GMT+5")
+    lower = np.where(stamps > stamps[7], 294.15, 289.15)  # from 6 h on
+    forecast = Forecast(pd.DataFrame({"room/comfort_lower_temperature": lower}, index=stamps))
+    seen = Measurements(PointLayout((f"room/{ZONE_TEMPERATURE}",), "Etc/GMT+5"), int(stamps[0].timestamp()), [293.0])
+    speed = Actuator("pump/speed", "1", 0.0, 1.0, kind="modulating", minimum=0.25)
+    machine, pi = Machine(speed, "machine", ("room",)), script("_foreign_rules").ProportionalIntegral
+    told = [pi([machine], lead=lead, above=0.0, gain=gain).step(seen, forecast) for lead, gain in (
+        (1.0, 0.5), (3.0, 0.5), (3.0, 0.15), (3.0, 0.05)
+    )]  # fmt: skip
+    assert [action["pump/speed"] for action in told] == pytest.approx([0.0, 0.5 * 1.15, 0.25, 0.0])
+    thermostat = Machine(Actuator("room/setpoint", "K", 285.0, 298.0), "setpoint", ("room",))
+    with pytest.raises(ControlError, match="expected a machine with a speed, found room/setpoint"):
+        pi([thermostat])
+
+
+@needs_energyplus
+def test_heat_of_the_house_arrives_late_and_is_paid_by_the_map(
+    made: Callable[..., Any], models: Callable[[str], ModuleType]
+) -> None:
+    off, full = {SPEED: 0.0}, {SPEED: 1.0}
+    seen = made("house", Held({0: off, 24: full, 48: off, 72: {SPEED: 0.0, CIRCULATOR: 1.0}}), 80)
+    heat, power = seen[f"heat_pump/{HEATING_POWER}"], seen["heat_pump/electrical_power_sensor"]
+    water = seen["heat_pump/supply_water_temperature_sensor"] - 273.15
+    air = seen["weather_station/outside_air_temperature_sensor"] - 273.15
+    house = models("house")
+    capacity, per_heat = house.MACHINE.curves().values()
+    terms = np.column_stack([np.ones(80), water, water**2, air, air**2, water * air])
+    steady = slice(40, 48)
+    np.testing.assert_allclose(heat[steady], (terms @ capacity * house.MACHINE.capacity)[steady], rtol=0.01)
+    np.testing.assert_allclose(power[steady], (heat * (terms @ per_heat) / house.MACHINE.cop)[steady], rtol=0.01)
+    # heat of the machine and of the pump's friction is in the floor, but for what the water holds
+    assert (heat[30:48].sum() + 18 * 45.0) == pytest.approx(seen[f"floor/{HEATING_POWER}"][30:48].sum(), rel=0.01)
+    # the slab is slow: in the second hour the room rises faster than in the first half, and goes on when it is off
+    room = seen[f"house/{ZONE_TEMPERATURE}"].to_numpy()
+    fall = room[23] - room[21]
+    assert room[25] - room[23] < 0.7 * (room[31] - room[29]) and room[51] - room[47] > -2.0 * abs(fall)
+    assert (power[:24] == 0.0).all() and (seen["floor/pump_power_sensor"][72:] == house.CIRCULATOR).all()
+    assert (seen["floor/pump_power_sensor"][50:72] == 0.0).all()
+
+
+@needs_energyplus
+@pytest.mark.parametrize("name", ["flats", "office", "shop"])
+def test_every_setpoint_reaches_its_heater(made: Callable[..., Any], name: str) -> None:
+    with_own = made(name, Held({}), 8)
+    setpoints = [column for column in with_own if column.endswith("zone_air_heating_temperature_setpoint")]
+    acted = made(name, Held({4: {column: 296.15 for column in setpoints}}), 8)
+    assert len(setpoints) == {"flats": 3, "office": 4, "shop": 1}[name]
+    np.testing.assert_allclose(acted.iloc[:4], with_own.iloc[:4], rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(acted[setpoints].iloc[4:], 296.15)
+    for column in setpoints:
+        room = f"{column.rpartition('/')[0]}/{ZONE_TEMPERATURE}"
+        assert acted[room].iloc[-1] > with_own[room].iloc[-1] + 0.5
+    heats = [column for column in with_own if column.endswith(HEATING_POWER)]
+    assert (acted[heats].iloc[5] > with_own[heats].iloc[5] + 500.0).all()
+
+
+@needs_energyplus
+def test_a_run_of_the_table(script: Callable[[str], ModuleType], models: Any, tmp_path: Path,
+                            monkeypatch: pytest.MonkeyPatch) -> None:  # fmt: skip
+    for name in ("plants", "periods"):
+        models(name)
+    for name in ("_code", "_table", "_foreign_rules", "_foreign_runs"):
+        script(name)
+    table, runs = script("foreign_plants"), script("_foreign_runs")
+    monkeypatch.setattr(runs, "DAYS", 1)
+    arguments = ["--out", str(tmp_path), "--plants", "house", "--periods", "coldest", "--controllers", "own", "rule"]
+    assert table.main(arguments) == 0
+    rows = json.loads((tmp_path / "foreign_plants.json").read_text())
+    assert [row["controller"] for row in rows] == ["own", "rule"] and all(row["days"] == 1.0 for row in rows)
+    assert "| house | coldest | own control |" in (tmp_path / "foreign_plants.md").read_text()
+    assert 0.005 < rows[1]["cost"] < rows[0]["cost"] < 0.05
