@@ -2,6 +2,7 @@
 
 from thermal.case.building import DEVICE_TYPES
 from thermal.components.air_handler import AirHandler
+from thermal.components.battery import Battery
 from thermal.components.boiler_loop import BoilerLoop
 from thermal.components.chiller_loop import ChillerLoop
 from thermal.components.component import Actuator, Component
@@ -23,7 +24,7 @@ COMPONENTS: dict[str, type[Component]] = {
     kind.device: kind
     for kind in (
         Terminals, AirHandler, BoilerLoop, Radiators, HeatPumpLoop, DistrictLoop, StorageTank, MixingValve, ChillerLoop,
-        HeatedFloors, ElectricHeaters, FanCoils, UnitaryUnits, Ventilators,
+        HeatedFloors, ElectricHeaters, FanCoils, UnitaryUnits, Ventilators, Battery,
     )
 }  # fmt: skip
 

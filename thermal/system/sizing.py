@@ -10,6 +10,7 @@ from thermal._types import FloatArray
 from thermal.case.building import Building, FloorPlans, ZoneTable
 from thermal.case.plan import zone_floor_areas
 from thermal.components.air_handler import AirHandler
+from thermal.components.battery import Battery
 from thermal.components.chiller_loop import ChillerLoop
 from thermal.components.component import Component
 from thermal.components.cooling_coil import CoolingCoil
@@ -139,6 +140,8 @@ def size_system(
         parts[kind.upper()] = COMPONENTS[kind].sized(heat, zone, **given)
         if isinstance(group := parts[kind.upper()], FanCoils) and not graph.chills:
             parts[kind.upper()] = replace(group, cools=False)
+    if graph.has_battery:
+        parts[Battery.device.upper()] = Battery.sized(float(areas.sum()))
     capacity = float(loss.sum())
     if graph.has_air:
         terminals = Terminals.sized(
