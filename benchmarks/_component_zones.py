@@ -33,13 +33,14 @@ from thermal.components.curves import (
     DX_INPUT,
 )
 from thermal.components.electric_heaters import ElectricHeaters
+from thermal.components.fan_coils import FanCoils
 from thermal.components.machine_map import Defrost, MachineMap
 from thermal.components.moist_air import wet_bulb
 from thermal.components.operations import FloatOperations, NumpyOperations
 from thermal.components.streams import HotWater, SupplyWater
+from thermal.components.unitary_units import UnitaryUnits
 from thermal.components.ventilators import Ventilators
 from thermal.components.water_coil import WaterCoil
-from thermal.components.zone_units import FanCoils, UnitaryUnits
 
 FREEZING, SITE_PRESSURE, DENSITY = 273.15, 99_060.0, 1.18  # K, Pa, kg/m3 of air at the site
 ZONES = ("electric", "fan coil", "unitary", "ventilator")

@@ -31,8 +31,12 @@ ANY_KEYWORD: dict[str, str] = {
             "cooling_coil.CoolingCoil",
             "fan.Fan",
             "heater.Heater",
+            "machine_map.Defrost",
+            "machine_map.MachineMap",
             "pump.Pump",
             "thermostat.Thermostat",
+            "water_loop.WaterLoop",
+            "zone_units.ZoneUnits",
         )
     },
 }

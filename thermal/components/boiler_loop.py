@@ -19,8 +19,12 @@ class BoilerLoop(WaterLoop):
 
     Parameters
     ----------
-    capacity, pump, standing_conductance, pipe_conductance, water_volume, fastest_rise
-        As in `WaterLoop`.
+    capacity : float
+        Rated heat into the water [W], positive.
+    pump : Pump
+        Of the loop.
+    standing_conductance, pipe_conductance, water_volume, fastest_rise
+        As in `WaterLoop` [W/K], [W/K], [m3], [K/s].
     efficiency : float
         Nominal, on the higher heating value [-], 0.5 to 1. The default is the Large Office's.
     efficiency_curve : Biquadratic

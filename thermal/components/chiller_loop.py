@@ -29,8 +29,12 @@ class ChillerLoop(WaterLoop):
 
     Parameters
     ----------
-    capacity, pump, standing_conductance, pipe_conductance, water_volume, fastest_rise
-        As in `WaterLoop`; the capacity is the rated cooling.
+    capacity : float
+        Rated cooling into the water [W], positive.
+    pump : Pump
+        Of the loop.
+    standing_conductance, pipe_conductance, water_volume, fastest_rise
+        As in `WaterLoop` [W/K], [W/K], [m3], [K/s].
     machine : MachineMap
         The chiller; x of its curves is the chilled water, y what cools the condenser. The default is air-cooled.
     tower : CoolingTower, optional

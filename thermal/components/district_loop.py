@@ -17,8 +17,12 @@ class DistrictLoop(WaterLoop):
 
     Parameters
     ----------
-    capacity, pump, standing_conductance, pipe_conductance, water_volume, fastest_rise
-        As in `WaterLoop`; the capacity is the rated one, at `network_temperature` and `rated_water`.
+    capacity : float
+        Rated heat, at `network_temperature` and `rated_water`, into the water [W], positive.
+    pump : Pump
+        Of the loop.
+    standing_conductance, pipe_conductance, water_volume, fastest_rise
+        As in `WaterLoop` [W/K], [W/K], [m3], [K/s].
     network_temperature : float
         Supply of the network [K]; the default is that of networks of the third generation in winter (Lund et al. 2014,
         doi:10.1016/j.energy.2014.02.089: below 100 degC).

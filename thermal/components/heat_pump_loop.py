@@ -26,8 +26,12 @@ class HeatPumpLoop(WaterLoop):
 
     Parameters
     ----------
-    capacity, pump, standing_conductance, pipe_conductance, water_volume, fastest_rise
-        As in `WaterLoop`; the capacity is the rated one.
+    capacity : float
+        Rated heat into the water [W], positive.
+    pump : Pump
+        Of the loop.
+    standing_conductance, pipe_conductance, water_volume, fastest_rise
+        As in `WaterLoop` [W/K], [W/K], [m3], [K/s].
     machine : MachineMap
         The heat pump; x of its curves is the supply water, y the source. The default is an air-to-water heat pump with
         an inverter (minimum of 30 %, EN 14825's usual), a tenth lost by cycling (EN 14825, C_c = 0.9) and controls of

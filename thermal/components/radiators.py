@@ -189,10 +189,16 @@ class HeatedFloors(WaterEmitters):
 
     Parameters
     ----------
-    nominal_heat, zone, exponent, supply_temperature, return_temperature, room_temperature, radiant_share
-        As in `WaterEmitters`. The exponent is that of EN 1264-2's basic characteristic, ``q = 8.92 (T_floor -
-        T_room)^1.1``; nominal temperatures are usual ones of floors, 35, 30 and 20 degC. Nothing radiates past the
-        layer: what the floor gives to the room is the building's.
+    nominal_heat : float or numpy.ndarray, shape (n_emitter,)
+        Heat at nominal temperatures [W], positive.
+    zone : numpy.ndarray of int, shape (n_emitter,)
+        Position of the zone that each is under.
+    exponent : float or numpy.ndarray, shape (n_emitter,)
+        Of the overtemperature [-]: that of EN 1264-2's basic characteristic, ``q = 8.92 (T_floor - T_room)^1.1``.
+    supply_temperature, return_temperature, room_temperature : float
+        Nominal temperatures [K]; the defaults are usual ones of floors, 35, 30 and 20 degC.
+    radiant_share : float
+        Of heat past the layer [-]: none, as what the floor gives to the room is the building's.
 
     Notes
     -----

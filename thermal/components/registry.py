@@ -2,19 +2,21 @@
 
 from thermal.case.building import DEVICE_TYPES
 from thermal.components.air_handler import AirHandler
+from thermal.components.battery import Battery
 from thermal.components.boiler_loop import BoilerLoop
 from thermal.components.chiller_loop import ChillerLoop
 from thermal.components.component import Actuator, Component
 from thermal.components.district_loop import DistrictLoop
 from thermal.components.electric_heaters import ElectricHeaters
+from thermal.components.fan_coils import FanCoils
 from thermal.components.heat_pump_loop import HeatPumpLoop
 from thermal.components.mixing_valve import MixingValve
 from thermal.components.radiators import HeatedFloors, Radiators
 from thermal.components.storage_tank import StorageTank
 from thermal.components.terminals import Terminals
 from thermal.components.thermostat import Thermostat
+from thermal.components.unitary_units import UnitaryUnits
 from thermal.components.ventilators import Ventilators
-from thermal.components.zone_units import FanCoils, UnitaryUnits
 from thermal.errors import ModelError
 
 #: Classes of components by type of device.
@@ -22,7 +24,7 @@ COMPONENTS: dict[str, type[Component]] = {
     kind.device: kind
     for kind in (
         Terminals, AirHandler, BoilerLoop, Radiators, HeatPumpLoop, DistrictLoop, StorageTank, MixingValve, ChillerLoop,
-        HeatedFloors, ElectricHeaters, FanCoils, UnitaryUnits, Ventilators,
+        HeatedFloors, ElectricHeaters, FanCoils, UnitaryUnits, Ventilators, Battery,
     )
 }  # fmt: skip
 

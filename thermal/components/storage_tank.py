@@ -205,8 +205,9 @@ class StorageTank(Component):
         layers, mean = ([a + b * water.temperature for a, b in each] for each in (lines, means))
         given.put("hot_water", SupplyWater(mean[0]))
         mass = self.volume * WATER_DENSITY * rate / len(layers) / given.seconds
+        first, second, third, fourth = layers
         return TankStep(
-            *layers,
+            first, second, third, fourth,
             taken * (water.temperature - mean[-1]),
             drawn.conductance * mean[0] - drawn.source,
             self.loss / len(layers) * sum(t - room for t in mean),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass
-from typing import Annotated, ClassVar, NamedTuple
+from typing import Annotated, ClassVar, NamedTuple, TypedDict
 
 from thermal.components.checks import in_range
 from thermal.components.component import Component, Conditions, Given, Range, Run
@@ -17,6 +17,14 @@ _LEAST = 1e-9
 _LEAST_PIPES = 20.0  # W/K
 SHORT_PIPES = 5.0  # W/K: 25 m of insulated pipe of a house, 0.2 W/m/K (EN 15316-3)
 _LITRES = 0.01  # m3 of water per kW, usual for loops of steel pipe
+
+
+class Pipes(TypedDict):
+    """Water and pipes of a loop as named parameters of `WaterLoop`."""
+
+    pipe_conductance: float
+    standing_conductance: float
+    water_volume: float
 
 
 class Heated(NamedTuple):
@@ -146,7 +154,7 @@ class WaterLoop(Component):
         in_range(f"{type(self).__name__}.pipe_conductance", self.pipe_conductance, "W/K", 0.0, highest)
 
     @staticmethod
-    def pipes(capacity: float, water_flow: float, least: float = _LEAST_PIPES) -> dict[str, float]:
+    def pipes(capacity: float, water_flow: float, least: float = _LEAST_PIPES) -> Pipes:
         """Size water and pipes, as named parameters.
 
         Parameters

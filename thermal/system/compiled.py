@@ -166,6 +166,7 @@ class CompiledSystem:
             traces.append(_Trace(held, list(told), slice(begin, len(carried)), drawn))
             if not moved:
                 raise ModelError("HvacSystem", "components that do not wait for each other", f"{runner.waiting}")
+        traces = traces or [_Trace([], [], slice(0, 0), len(load))]  # where nobody waits for anybody
         return self._functions(symbols, traces, {name: runner.results[name] for name in system.singles})
 
     def _functions(self, symbols: tuple[list[Any], ...], traces: list[_Trace], results: dict[str, Any]) -> list[_Phase]:

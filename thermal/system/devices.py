@@ -6,6 +6,7 @@ import numpy as np
 
 from thermal.case.building import Building, Device, FloorPlans
 from thermal.components.air_handler import AirHandler
+from thermal.components.battery import Battery
 from thermal.components.boiler_loop import BoilerLoop
 from thermal.components.chiller_loop import ChillerLoop
 from thermal.components.component import Group, IndexArray
@@ -38,6 +39,8 @@ class DeviceGraph:
         Whether something makes chilled water.
     has_air : bool
         Whether it has terminals and air handlers, its own or, where some zone has nothing that heats it, assumed ones.
+    has_battery : bool
+        Whether it has a battery.
     unused : dict of str to str
         Devices that a plant made of the graph leaves out, each with the reason.
     """
@@ -48,6 +51,7 @@ class DeviceGraph:
     water: tuple[str, ...]
     chills: bool
     has_air: bool
+    has_battery: bool
     unused: dict[str, str]
 
 
@@ -95,13 +99,14 @@ def device_graph(building: Building) -> DeviceGraph:
                 serving[zones.index(str(device.zone))] = air_handlers.index(name)
         elif issubclass(kind, Group):
             emitters[device.type] = (*emitters.get(device.type, ()), device)
-        elif device.type not in (AirHandler.device, ChillerLoop.device, *water):
+        elif device.type not in (AirHandler.device, ChillerLoop.device, Battery.device, *water):
             supplied = f"the hot water is from {source}"
             why = supplied if device.type in supplies else "no rule connects it: pass the system"
             unused[device.name] = f"{device.type}, {why}"
     heated = {d.zone for kind, found in emitters.items() for d in found if kind != Ventilators.device}
     has_air = bool({"vav", AirHandler.device} & set(types)) or not set(zones) <= heated
-    return DeviceGraph(air_handlers, serving, emitters, water, ChillerLoop.device in types, has_air, unused)
+    chills, battery = (kind.device in types for kind in (ChillerLoop, Battery))
+    return DeviceGraph(air_handlers, serving, emitters, water, chills, has_air, battery, unused)
 
 
 def _by_floor(building: Building, count: int) -> IndexArray:

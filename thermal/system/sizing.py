@@ -10,17 +10,19 @@ from thermal._types import FloatArray
 from thermal.case.building import Building, FloorPlans, ZoneTable
 from thermal.case.plan import zone_floor_areas
 from thermal.components.air_handler import AirHandler
+from thermal.components.battery import Battery
 from thermal.components.chiller_loop import ChillerLoop
 from thermal.components.component import Component
 from thermal.components.cooling_coil import CoolingCoil
 from thermal.components.fan import Fan
+from thermal.components.fan_coils import FanCoils
 from thermal.components.mixing_valve import MixingValve
 from thermal.components.radiators import HeatedFloors
 from thermal.components.registry import COMPONENTS
 from thermal.components.terminals import Terminals
 from thermal.components.thermostat import Thermostat
 from thermal.components.water_coil import WaterCoil
-from thermal.components.zone_units import FanCoils, ZoneUnits
+from thermal.components.zone_units import ZoneUnits
 from thermal.errors import ModelError
 from thermal.model.matrices import SymbolicModel
 from thermal.model.step import Stepper
@@ -138,6 +140,8 @@ def size_system(
         parts[kind.upper()] = COMPONENTS[kind].sized(heat, zone, **given)
         if isinstance(group := parts[kind.upper()], FanCoils) and not graph.chills:
             parts[kind.upper()] = replace(group, cools=False)
+    if graph.has_battery:
+        parts[Battery.device.upper()] = Battery.sized(float(areas.sum()))
     capacity = float(loss.sum())
     if graph.has_air:
         terminals = Terminals.sized(
@@ -188,7 +192,8 @@ def joined(
         supplier = valve_name if name in floors and valve_name in made else before
         links.append(Connection(name, "hot_water", (supplier,)))
     if cold:
-        chiller, through = ChillerLoop.device.upper(), sum(np.sum(part.chilled_flow) for part in cold.values())
+        chiller = ChillerLoop.device.upper()
+        through = sum(np.sum(part.chilled_flow) for part in cold.values() if isinstance(part, FanCoils))
         made[chiller] = ChillerLoop.sized(cooling, float(through))
         links += [Connection(name, "chilled_water", (chiller,)) for name in cold]
     return HvacSystem({**parts, **made}, tuple(links), thermostat or Thermostat())

@@ -16,7 +16,7 @@ KINDS = {
     "floors": (("floor_heating",), ("heat_pump", "storage_tank", "mixing_valve")),
     "coils": (("fan_coil",), ("heat_pump", "chilled_water_plant")),
     "unitary": (("unitary_heat_pump",), ()),
-    "heaters": (("electric_heater", "heat_recovery_ventilator"), ()),
+    "heaters": (("electric_heater", "heat_recovery_ventilator"), ("battery",)),
 }
 
 

@@ -81,10 +81,10 @@ def test_a_tower_is_merkels_integral() -> None:
         driving = enthalpy(along, saturation_humidity(ops, along, 101_325.0)) - air
         return float(np.trapezoid(water / np.maximum(driving, 1.0), along))
 
-    for rejected, wet_bulb in ((1e5, 298.75), (6e4, 293.15), (1.2e5, 283.15)):
-        found = tower._leaving(OPS, rejected, wet_bulb, 1.0)
+    for rejected, wet in ((1e5, 298.75), (6e4, 293.15), (1.2e5, 283.15)):
+        found = tower._leaving(OPS, rejected, wet, 1.0)
         ends = found - 3.0, found + 5.0
-        exact = brentq(lambda t, q=rejected, w=wet_bulb: units(t, q, w) - tower.conductance / 1006.0, *ends)
+        exact = brentq(lambda t, q=rejected, w=wet: units(t, q, w) - tower.conductance / 1006.0, *ends)
         assert found == pytest.approx(exact, abs=0.6)
 
 

@@ -12,11 +12,12 @@ from hypothesis import strategies as st
 
 from thermal.components.component import Calls, Conditions, Given, Group
 from thermal.components.electric_heaters import ElectricHeaters
+from thermal.components.fan_coils import FanCoils
 from thermal.components.operations import NumpyOperations, StepOperations
 from thermal.components.radiators import HeatedFloors
 from thermal.components.streams import HotWater, SupplyWater
+from thermal.components.unitary_units import DX_COOLING, UnitaryUnits
 from thermal.components.ventilators import Ventilators
-from thermal.components.zone_units import DX_COOLING, FanCoils, UnitaryUnits
 from thermal.errors import ModelError
 
 OPS, TWO = StepOperations(), np.array([0, 1])

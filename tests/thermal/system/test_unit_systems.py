@@ -22,7 +22,7 @@ from thermal.system.symbolic import hvac_function
 from thermal.system.system import HvacSystem
 
 KINDS = {
-    "heaters": (("electric_heater", "heat_recovery_ventilator"), ()),
+    "heaters": (("electric_heater", "heat_recovery_ventilator"), ("battery",)),
     "floors": (("floor_heating", "radiator"), ("heat_pump", "storage_tank", "mixing_valve")),
     "district": (("radiator",), ("district_heating",)),
     "coils": (("fan_coil",), ("heat_pump", "chilled_water_plant")),
