@@ -46,10 +46,10 @@ def test_prices_comfort_and_display_are_options(tmp_path: Path) -> None:
     )  # fmt: skip
     assert answer.exit_code == 0, answer.stderr
     text = " ".join(answer.stdout.split())
-    assert "[EUR]" in text and "[°F h]" in text and "66.00 to 78.00 °F" in text
+    assert "[EUR]" in text and "[°F h]" in text and "66.00 to 78.01 °F" in text
     assert "0.3 EUR per kWh" in text and "0.03412 EUR per kWh" in text
     page = (out / "report.html").read_text(encoding="utf-8")
-    for told in ("What these costs rest on", "energy cost [EUR]", "discomfort, mean zone [°F h]", "nothing is converted", "66.00 to 78.00 °F", "0.3 EUR per kWh"):
+    for told in ("What these costs rest on", "energy cost [EUR]", "discomfort, mean zone [°F h]", "nothing is converted", "66.00 to 78.01 °F", "0.3 EUR per kWh"):
         assert told in page
     assert "/zone_air_temperature_sensor [degC]" in (out / "trajectory_reset.csv").read_text(encoding="utf-8")
     assert ("outside of the band" in page) == ("left the comfort band" in page)

@@ -20,6 +20,7 @@ import pytest
 from typer.testing import CliRunner
 
 import calibration.fleet.cluster
+import calibration.fleet.run  # before a cluster is replaced: it takes the class as it is then
 from calibration import calibrate
 from mpc.cli.app import app
 from thermal.pilot.building import PilotSettings, generate_pilot

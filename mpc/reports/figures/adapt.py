@@ -86,7 +86,7 @@ def in_units(figure: Figure, shown: Display) -> None:
                 axis.set_major_locator(_InUnits(line))
             digits = 2 if fixed else 6
             axis.set_major_formatter(
-                FuncFormatter(lambda x, _, line=line, n=digits: f"{line(x):.{n}g}".replace("-", "−"))  # type: ignore[misc]
+                FuncFormatter(lambda x, _, line=line, n=digits: f"{line(x):.{n}g}".replace("-", "−"))
             )
         lines = [line for line in map(axis_line, (axes.yaxis, axes.xaxis)) if line is not None]
         for text in axes.texts if lines else ():  # labels of bars and points: numbers of the axis

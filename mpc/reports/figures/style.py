@@ -111,7 +111,9 @@ def picture(figure: Figure, alt: str, *, zoom: bool = False, phone: bool = True)
     """
     shown = display()
     for area in figure.findobj(PolyCollection):
-        area.set_rasterized(sum(len(path.vertices) for path in area.get_paths()) > _MOST_CORNERS)  # type: ignore[attr-defined]
+        if isinstance(area, PolyCollection):
+            corners = sum(np.size(path.vertices) // 2 for path in area.get_paths())
+            area.set_rasterized(corners > _MOST_CORNERS)
     interactive = None
     if zoom:
         figure.draw_without_rendering()
