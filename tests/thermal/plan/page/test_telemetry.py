@@ -197,7 +197,7 @@ def test_a_file_that_is_no_table_is_refused_by_name(
         ({"file": "spam.csv"}, "PlanError", "the name of a file on the page"),
         ({"file": "../labelling.json"}, "PlanError", "a file in the folder"),
         ({"address": "file:///etc/passwd"}, "LabelError", "postgresql://"),
-        ({"address": "mysql://root:secret@host/db"}, "LabelError", "postgresql://"),
+        ({"address": "mysql://me:secret@host/db"}, "LabelError", "postgresql://"),
         ({"file": "export.csv", "timezone": "Mars/Olympus"}, "PlanError", "an IANA name"),
         ({"file": "export.csv"}, "PlanError", "stamps with an offset"),
     ],
