@@ -302,7 +302,7 @@ class IdentifiedController:
             served = [k for k, name in enumerate(self.model.box.zones) if name in found.machine.serves]
             idle, full = found.above
             value = float(zone[served].mean()) + REFERENCE + idle + level * (full - idle)
-            # a thermostat holds what it is told: told the edge it keeps the band where the model is wrong, at no other cost
+            # a thermostat holds what it is told: told the edge it keeps the band where the model is wrong
             edge = float(ahead.lower[0, served].max()) + max(self.back_off, 0.0)
             return float(np.clip(edge if level <= _IDLE else max(value, edge), low, high))
         if found.operation == "duty":
