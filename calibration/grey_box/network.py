@@ -215,7 +215,7 @@ class GreyBox:
         nz, by_zone = len(self.zones), self.shares.reshape(4, len(self.zones), -1).sum(axis=0)
         weights = np.zeros(self.shares.shape)
         weights[nz : 2 * nz] = by_zone / by_zone.sum(axis=0)
-        return weights
+        return np.asarray(weights)
 
     @cached_property
     def input_matrix(self) -> FloatArray:
@@ -248,9 +248,7 @@ class GreyBox:
         pushed = modes.T @ (root[:, None] * push)
         transition, drive = (back * decay) @ into, back @ ((mean * step)[:, None] * pushed)
         seen, through = (back * mean)[:nz] @ into, back[:nz] @ (((1.0 - mean) / rate)[:, None] * pushed)
-        return StateSpace(
-            step, transition, drive, seen, through, np.eye(nz, 4 * nz), np.ones(4 * nz), np.eye(4 * nz)
-        )
+        return StateSpace(step, transition, drive, seen, through, np.eye(nz, 4 * nz), np.ones(4 * nz), np.eye(4 * nz))
 
     def disturbed(self, step: float) -> DisturbedSpace:
         """Give the state space with the unmeasured heat of each zone as a further state.

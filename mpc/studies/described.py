@@ -51,7 +51,7 @@ class PlantStudy:
     start: str | None = None
     end: str | None = None
     model: PlantModel | None = None
-    settings: IdentifiedSettings = IdentifiedSettings()
+    settings: IdentifiedSettings = field(default_factory=IdentifiedSettings)
     actuators: tuple[str, ...] = ()
 
     decided = "the machines' runs and loads"
@@ -65,8 +65,8 @@ class PlantStudy:
     def _changes(self) -> dict[str, Any]:
         if self.start is None and self.end is None:
             return {}
-        both = self.start is not None and self.end is not None
-        PlantError.unless(both, "period", "--start and --end, or neither", f"{self.start} to {self.end}")
+        if self.start is None or self.end is None:
+            raise PlantError("period", "--start and --end, or neither", f"{self.start} to {self.end}")
         begin, end = pd.Timestamp(self.start), pd.Timestamp(self.end)
         days = (end - begin).total_seconds() / 86_400.0
         PlantError.unless(days > 0.0, "period", "an end after the start", f"{self.start} to {self.end}")

@@ -13,8 +13,8 @@ from mpc.control.controller.site import Action
 from mpc.control.identified.controller import PlannedAction
 from mpc.control.predictor.predictor import Predictor
 from mpc.errors import ControlError
-from mpc.kpi.kpis import Kpis, measure_kpis
 from mpc.identify.telemetry import on_control_steps, run_recorded
+from mpc.kpi.kpis import Kpis, measure_kpis
 from mpc.loop.plant import Controller, Measurements
 from mpc.loop.run import ClosedLoopRun, run_closed_loop
 from mpc.loop.simulated import SimulatedPlant
@@ -207,7 +207,8 @@ def _planned(action: PlannedAction) -> Decision:
     power = action.power[:row].mean(axis=0)
     powers = float(power[0]), float(power[1])
     told = str(solution.status), action.reasons
-    return Decision(action.stamp, action.source, *told, action.zone[min(row, len(action.zone) - 1)], powers, action.seconds)
+    zone = action.zone[min(row, len(action.zone) - 1)]
+    return Decision(action.stamp, action.source, *told, zone, powers, action.seconds)
 
 
 def prediction_errors(run: ControlRun) -> dict[str, Any]:
@@ -318,7 +319,9 @@ class Comparison:
         return (best.objective - run.objective) / (best.objective - bound.objective)
 
 
-def compare_controllers(study: Study | PlantStudy, names: Sequence[str], progress: Progress | None = None) -> Comparison:
+def compare_controllers(
+    study: Study | PlantStudy, names: Sequence[str], progress: Progress | None = None
+) -> Comparison:
     """Run several controllers on a study, one after the other.
 
     Parameters

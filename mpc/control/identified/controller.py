@@ -232,14 +232,14 @@ class IdentifiedController:
         return (False,) if not runs.on and len(runs.starts) >= self.settings.starts else (True, False)
 
     def _block(self, k: int, on: bool) -> int:
-        """Steps that a choice holds: the shortest run or rest where it switches, what is left of it, else one."""
+        """Tell the steps that a choice holds: the shortest run or rest where it switches, what is left of it, else one."""
         runs = self._runs[k]
         if on != runs.on:
             return self._hold if on else 1
         return max(self._hold - runs.since, 1)
 
     def _starting(self, k: int, on: bool, found: StageSolution, steps: int) -> float:
-        """What starts cost that follow from a choice [currency].
+        """Price the starts that follow from a choice [currency].
 
         A machine that is off and will run later starts once either way. One that has run n steps shares its start among
         them: another step makes that c / n cheaper, which is what an end of the run forgoes.
@@ -311,7 +311,7 @@ class IdentifiedController:
         return float(np.clip(value, low, high))
 
     def _powers(self, solution: StageSolution, ahead: Ahead) -> FloatArray:
-        """Expected electricity and other carriers, shape (N, 2) [W]."""
+        """Give expected electricity and other carriers, shape (N, 2) [W]."""
         emitter = REFERENCE + solution.states[:-1] @ self.model.box.emitter_weights
         powers = np.zeros((len(solution.decisions), 2))
         for carrier, base in self.model.base.items():
@@ -321,4 +321,3 @@ class IdentifiedController:
                 value: Any = found.at(curve, solution.decisions[:, k], ahead.outdoor, emitter[:, k])
                 powers[:, int(carrier != "electricity")] += value
         return powers
-
