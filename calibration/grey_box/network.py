@@ -207,7 +207,7 @@ class GreyBox:
         weights /= weights.sum(axis=1, keepdims=True)
         whole = np.zeros((4 * nz, nm))
         whole[: _HEATED * nz] = np.einsum("mk,mz->kzm", nodes, weights).reshape(_HEATED * nz, nm)
-        return whole
+        return np.asarray(whole)
 
     @cached_property
     def emitter_weights(self) -> FloatArray:

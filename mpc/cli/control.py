@@ -51,7 +51,7 @@ class StudyOptions:
     dx: Dx = None
     comfort_price: Annotated[
         float | None,
-        value("Of a zone's kelvin outside of its band for an hour, in optimal control; default 1, of plants 10.", "PRICE"),
+        value("Of a zone's kelvin outside of its band for an hour; default 1, of a plant.yaml 10.", "PRICE"),
     ] = None
     tariff: Annotated[
         Path | None, file("Of electricity, from the Utility Rate Database; default: the paper's, as for gas.")

@@ -225,7 +225,7 @@ def regress(loads: Loads, values: FloatArray, machines: Sequence[int]) -> tuple[
             columns.append(feature[rows[loads.known]])
             owners.append((m, name))
     PlantError.unless(
-        rows.sum() > 4 * len(columns), "component maps", f"{4 * len(columns)} steps with known commands", int(rows.sum()),
+        rows.sum() > 4 * len(columns), "component maps", f"{4 * len(columns)} steps with known commands", rows.sum(),
         "give more days, or telemetry whose commands are recorded",
     )  # fmt: skip
     design = np.column_stack(columns)

@@ -280,6 +280,7 @@ def on_control_steps(record: PlantRecord, step: float) -> PlantRecord:
     whole = parts >= 1 and record.n_steps % parts == 0
     PlantError.unless(whole, "record", f"whole control steps of {step:g} s", f"{record.n_steps} of {record.step:g} s")
     return PlantRecord(
-        step, record.zone_temperature[::parts], np.asarray(mean(record.electricity)), mean(record.gas), mean(record.district_heating),
+        step, record.zone_temperature[::parts], np.asarray(mean(record.electricity)), mean(record.gas),
+        mean(record.district_heating),
         controller_seconds=record.controller_seconds,
     )  # fmt: skip
