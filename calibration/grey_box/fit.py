@@ -77,7 +77,13 @@ class GreyBoxData:
         return replace(self, **{k: v[part] for k, v in vars(self).items() if k != "step"})
 
     def pushes(self, box: GreyBox) -> FloatArray:
-        """Collect the inputs of a network's state space, shape (n_time, n_input)."""
+        """Collect the inputs of a network's state space, shape (n_time, n_input).
+
+        Parameters
+        ----------
+        box : GreyBox
+            Network.
+        """
         return np.column_stack([self.outdoor - REFERENCE, self.sun, box.delivered(self.heat, self.outdoor),
                                 self.gain + box.parts["constant gain"]])  # fmt: skip
 

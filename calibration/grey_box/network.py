@@ -66,7 +66,7 @@ class GreyBox:
         Of each source, whether its heat is measured; where it is not, what it buys is given instead, and heat is that
         times ``1 + slope (T_out - 7 degC) / 10 K``: watts of heat are then counted in watts of what is bought.
     point : ndarray, shape (n_parameter,)
-        Parameters in the order of `names` [logarithms of J/K and W/K, m2, -].
+        Parameters in the order of `names` [-]: logarithms of J/K and W/K, m2, W, shares.
     disturbance : DisturbanceModel
         Unmeasured heat into air, and noise of the sensors.
     """
@@ -170,7 +170,7 @@ class GreyBox:
     @cached_property
     def capacity(self) -> FloatArray:
         """Capacity of each node, shape (4 n_zone,) [J/K]."""
-        return np.exp(np.concatenate([self.parts[f"capacity of {node}"] for node in NODES]))
+        return np.asarray(np.exp(np.concatenate([self.parts[f"capacity of {node}"] for node in NODES])))
 
     @cached_property
     def _conductance(self) -> tuple[FloatArray, FloatArray]:

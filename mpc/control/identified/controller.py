@@ -81,7 +81,10 @@ class PlannedAction(dict[str, float]):
         When the action begins.
     source, reasons : str and tuple of str
         ``optimal plan`` or ``rules``, and why.
-    solution : StageSolution, optional
+
+    Attributes
+    ----------
+    solution : StageSolution or None
         Of the solver.
     zone, power : ndarray
         Expected at the edges of the steps, shape (N + 1, n_zone) [K], and electricity and other carriers over them,
