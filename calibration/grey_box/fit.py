@@ -77,7 +77,13 @@ class GreyBoxData:
         return replace(self, **{k: v[part] for k, v in vars(self).items() if k != "step"})
 
     def pushes(self, box: GreyBox) -> FloatArray:
-        """Inputs of a network's state space, shape (n_time, n_input)."""
+        """Collect the inputs of a network's state space, shape (n_time, n_input).
+
+        Parameters
+        ----------
+        box : GreyBox
+            Network.
+        """
         return np.column_stack([self.outdoor - REFERENCE, self.sun, box.delivered(self.heat, self.outdoor),
                                 self.gain + box.parts["constant gain"]])  # fmt: skip
 
@@ -121,7 +127,7 @@ def steady_gain(box: GreyBox, step: float) -> tuple[FloatArray, FloatArray]:
     covariance, _ = doubled_riccati(whole.dense() / unit[:, None] * unit, information, drive)
     spread = (covariance * np.outer(unit, unit)) @ whole.observation.T
     innovation = whole.observation @ spread + np.diag(np.broadcast_to(whole.noise_variance, len(box.zones)))
-    return np.linalg.solve(innovation, spread.T).T, innovation
+    return np.asarray(np.linalg.solve(innovation, spread.T).T, dtype=float), innovation
 
 
 def follow(box: GreyBox, data: GreyBoxData) -> Followed:
@@ -148,7 +154,7 @@ def follow(box: GreyBox, data: GreyBoxData) -> Followed:
     # prediction and correction in one: x' = (A - A K C) x + A K y + B u, where all zones are measured
     closed, given = matrix - inward @ observe, np.where(known, seen, 0.0) @ inward.T
     given[:, : space.order] += pushed
-    for k, whole_row in enumerate(known.all(axis=1).tolist()):
+    for k, whole_row in enumerate(np.asarray(known.all(axis=1)).tolist()):
         states[k] = z
         if whole_row:
             z = closed @ z + given[k]
@@ -215,9 +221,7 @@ def run_starts(data: GreyBoxData, steps: int, every: float = EVERY) -> IntArray:
     return starts
 
 
-def fit_grey_box(
-    start: GreyBox, data: GreyBoxData, progress: Callable[[str, int, int], None] | None = None
-) -> GreyBox:
+def fit_grey_box(start: GreyBox, data: GreyBoxData, progress: Callable[[str, int, int], None] | None = None) -> GreyBox:
     """Fit a network by least squares on the errors of predictions over a day, from filtered states.
 
     That is what a controller needs of it, rather than the likelihood of the next step alone (Zhao, Lu, Yan and Li 2011
@@ -242,9 +246,7 @@ def fit_grey_box(
     return _fitted(tune_noise(first, data), data, progress, 1)
 
 
-def _fitted(
-    start: GreyBox, data: GreyBoxData, progress: Callable[[str, int, int], None] | None, part: int
-) -> GreyBox:
+def _fitted(start: GreyBox, data: GreyBoxData, progress: Callable[[str, int, int], None] | None, part: int) -> GreyBox:
     from scipy.optimize import least_squares
 
     steps, stride = round(AHEAD / data.step), max(round(SEEN / data.step), 1)

@@ -80,8 +80,8 @@ def judge(box: GreyBox, data: GreyBoxData, split: int, leads: Sequence[float] = 
         errors = predict(box, data, followed.states, starts, steps)[:, -1] - target
         kept = data.zone[starts - 1] - target
         arx = _arx(data, tuned, starts, steps) - target
-        means = [float(np.nanmean(np.abs(e))) for e in (errors, kept, arx)]
-        found.append(LeadError(lead, *means, float(np.nanmean(errors)), len(starts)))
+        mae, persistence, ridge = (float(np.nanmean(np.abs(e))) for e in (errors, kept, arx))
+        found.append(LeadError(lead, mae, persistence, ridge, float(np.nanmean(errors)), len(starts)))
     return found
 
 
@@ -107,5 +107,7 @@ def _arx(data: GreyBoxData, tuned: IntArray, starts: IntArray, steps: int) -> Fl
     centre, spread = x.mean(axis=0), x.std(axis=0)
     spread[spread < 1e-9 * np.maximum(1.0, np.abs(centre))] = np.inf
     middle = y.mean(axis=0)
-    model = [OLS(column, (x - centre) / spread).fit_regularized(alpha=_RIDGE, L1_wt=0.0).params for column in (y - middle).T]
+    model = [
+        OLS(column, (x - centre) / spread).fit_regularized(alpha=_RIDGE, L1_wt=0.0).params for column in (y - middle).T
+    ]
     return np.asarray(zone[starts - 1] + middle + (features(starts) - centre) / spread @ np.column_stack(model))

@@ -66,7 +66,7 @@ class GreyBox:
         Of each source, whether its heat is measured; where it is not, what it buys is given instead, and heat is that
         times ``1 + slope (T_out - 7 degC) / 10 K``: watts of heat are then counted in watts of what is bought.
     point : ndarray, shape (n_parameter,)
-        Parameters in the order of `names` [logarithms of J/K and W/K, m2, -].
+        Parameters in the order of `names` [-]: logarithms of J/K and W/K, m2, W, shares.
     disturbance : DisturbanceModel
         Unmeasured heat into air, and noise of the sensors.
     """
@@ -170,7 +170,7 @@ class GreyBox:
     @cached_property
     def capacity(self) -> FloatArray:
         """Capacity of each node, shape (4 n_zone,) [J/K]."""
-        return np.exp(np.concatenate([self.parts[f"capacity of {node}"] for node in NODES]))
+        return np.asarray(np.exp(np.concatenate([self.parts[f"capacity of {node}"] for node in NODES])))
 
     @cached_property
     def _conductance(self) -> tuple[FloatArray, FloatArray]:
@@ -207,7 +207,7 @@ class GreyBox:
         weights /= weights.sum(axis=1, keepdims=True)
         whole = np.zeros((4 * nz, nm))
         whole[: _HEATED * nz] = np.einsum("mk,mz->kzm", nodes, weights).reshape(_HEATED * nz, nm)
-        return whole
+        return np.asarray(whole)
 
     @cached_property
     def emitter_weights(self) -> FloatArray:
@@ -215,7 +215,7 @@ class GreyBox:
         nz, by_zone = len(self.zones), self.shares.reshape(4, len(self.zones), -1).sum(axis=0)
         weights = np.zeros(self.shares.shape)
         weights[nz : 2 * nz] = by_zone / by_zone.sum(axis=0)
-        return weights
+        return np.asarray(weights)
 
     @cached_property
     def input_matrix(self) -> FloatArray:
@@ -248,9 +248,7 @@ class GreyBox:
         pushed = modes.T @ (root[:, None] * push)
         transition, drive = (back * decay) @ into, back @ ((mean * step)[:, None] * pushed)
         seen, through = (back * mean)[:nz] @ into, back[:nz] @ (((1.0 - mean) / rate)[:, None] * pushed)
-        return StateSpace(
-            step, transition, drive, seen, through, np.eye(nz, 4 * nz), np.ones(4 * nz), np.eye(4 * nz)
-        )
+        return StateSpace(step, transition, drive, seen, through, np.eye(nz, 4 * nz), np.ones(4 * nz), np.eye(4 * nz))
 
     def disturbed(self, step: float) -> DisturbedSpace:
         """Give the state space with the unmeasured heat of each zone as a further state.

@@ -53,7 +53,7 @@ class StudyOptions:
     dx: Dx = None
     comfort_price: Annotated[
         float | None,
-        value("Of a zone's kelvin outside of its band for an hour, for optimal control; default: 1, of a plant 10.", "PRICE"),
+        value("Of a zone's kelvin outside of its band for an hour; default 1, of a plant.yaml 10.", "PRICE"),
     ] = None
     weather: Annotated[
         Path | None, file("EPW: a typical year in place of the weather that was measured with the case.")
@@ -132,8 +132,8 @@ def control(
     controller: Annotated[
         str,
         value(
-            "mpc, schedule, reset, guideline36, bound (perfect knowledge), of a plant.yaml mpc, full_speed or own, or one "
-            "of a plugin.", "NAME",
+            "mpc, schedule, reset, guideline36, bound (perfect knowledge), of a plant.yaml mpc, full_speed or own, or "
+            "one of a plugin.", "NAME",
         ),
     ] = "mpc",
 ) -> int:

@@ -22,7 +22,9 @@ def identify(
     ] = None,
     telemetry: Annotated[
         Path | None,
-        options.file("Telemetry that is there already, such as trajectory.parquet of `control`; no experiment is made."),
+        options.file(
+            "Telemetry that is there already, such as trajectory.parquet of `control`; no experiment is made."
+        ),
     ] = None,
     actuators: Annotated[
         str, options.value("What is controlled; default: commands of machines, else setpoints of zones.", "NAME,...")
@@ -65,7 +67,9 @@ def identify(
         say(identify_verdict(found, made))
         columns = {"ahead": "", "grey box [K]": ".3f", "ridge ARX [K]": ".3f", "persistence [K]": ".3f"}
         show_table("Error on days that were held out", columns, identify_rows(found))
-        show_table("Machines", dict.fromkeys(("machine", "what", "term", "value", "95 % interval"), ""), map_rows(found.model))
+        show_table(
+            "Machines", dict.fromkeys(("machine", "what", "term", "value", "95 % interval"), ""), map_rows(found.model)
+        )
         for note in found.notes:
             say(f"Assumed: {note}.")
 

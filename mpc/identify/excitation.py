@@ -1,4 +1,4 @@
-"""An excitation that is safe to run on people: random levels within the comfort bands, and back to the plant outside."""
+"""An excitation that is safe to run on people: random levels within comfort bands, and back to the plant outside."""
 
 from __future__ import annotations
 

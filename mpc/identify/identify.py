@@ -97,14 +97,14 @@ def identify(telemetry: PlantTelemetry, machines: Sequence[Machine], progress: P
 
 
 def _data(telemetry: PlantTelemetry, machines: Sequence[Machine]) -> GreyBoxData:
-    """Inputs of the grey box."""
+    """Collect the inputs of the grey box."""
     sun = np.column_stack([*telemetry.suns.values()]) if telemetry.suns else np.empty((len(telemetry.frame), 0))
     heat = np.column_stack([machine.signal(telemetry) for machine in machines])
     return GreyBoxData(telemetry.step, telemetry.zone, telemetry.outdoor, sun, heat, telemetry.gain)
 
 
 def _loads(telemetry: PlantTelemetry, machines: Sequence[Machine], data: GreyBoxData, box: GreyBox) -> Loads:
-    """Loads, with the temperatures of the emitters as the grey box has them."""
+    """Collect loads, with the temperatures of the emitters as the grey box has them."""
     states = follow(box, data).states[:-1]
     level = np.column_stack([machine.level(telemetry) for machine in machines])
     emitter = states[:, : box.capacity.size] @ box.emitter_weights + REFERENCE
@@ -121,8 +121,10 @@ def _above(telemetry: PlantTelemetry, machines: Sequence[Machine]) -> FloatArray
         measured = telemetry.frame.get(machine.name)
         value = set_to if set_to is not None and set_to.notna().any() else measured
         zone = telemetry.frame[f"{machine.serves[0]}/{ZONE_TEMPERATURE}"]
-        known = machine.role == "setpoint" and value is not None
-        columns.append((value - zone).to_numpy(dtype=float) if known else np.full(len(zone), np.nan))
+        if machine.role == "setpoint" and value is not None:
+            columns.append((value - zone).to_numpy(dtype=float))
+        else:
+            columns.append(np.full(len(zone), np.nan))
     return np.column_stack(columns)
 
 
@@ -139,4 +141,3 @@ def _notes(telemetry: PlantTelemetry, machines: Sequence[Machine], suns: Sequenc
     if not telemetry.gain.any():
         notes.append("no people are forecast: their heat is part of the unmeasured heat")
     return tuple(notes)
-

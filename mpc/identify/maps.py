@@ -10,7 +10,7 @@ import numpy as np
 
 from mpc.errors import PlantError
 from mpc.identify.machines import Machine
-from thermal._types import FloatArray
+from thermal._types import BoolArray, FloatArray
 
 #: How a machine is run: whole or not at all for parts of the time, at any part load, or by a zone's own controller.
 Operation = Literal["duty", "modulated", "setpoint"]
@@ -166,9 +166,9 @@ class Loads:
     emitter: FloatArray
 
     @property
-    def known(self) -> FloatArray:
+    def known(self) -> BoolArray:
         """Steps whose loads are all known, shape (n_time,)."""
-        return np.isfinite(self.level).all(axis=1)
+        return np.asarray(np.isfinite(self.level).all(axis=1))
 
     def features(self, m: int) -> dict[str, FloatArray]:
         """Features of a machine that its loads tell apart.
@@ -225,7 +225,7 @@ def regress(loads: Loads, values: FloatArray, machines: Sequence[int]) -> tuple[
             columns.append(feature[rows[loads.known]])
             owners.append((m, name))
     PlantError.unless(
-        rows.sum() > 4 * len(columns), "component maps", f"{4 * len(columns)} steps with known commands", int(rows.sum()),
+        rows.sum() > 4 * len(columns), "component maps", f"{4 * len(columns)} steps with known commands", rows.sum(),
         "give more days, or telemetry whose commands are recorded",
     )  # fmt: skip
     design = np.column_stack(columns)
@@ -294,7 +294,7 @@ def _local(level: FloatArray, above: FloatArray) -> tuple[float, float]:
 
 
 def interval_of(curve: Curve, feature: str) -> tuple[float, float]:
-    """Ends of the 95 % interval of a coefficient [W].
+    """Give the ends of the 95 % interval of a coefficient [W].
 
     Parameters
     ----------

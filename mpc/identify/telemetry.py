@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -98,7 +98,7 @@ class PlantTelemetry:
             return np.zeros(len(self.frame))
         limit = max(round(_BRIDGED / self.step), 1)
         filled = self.frame[name].astype(float).interpolate(limit=limit, limit_direction="both")
-        return filled.fillna(0.0).to_numpy()
+        return np.asarray(filled.fillna(0.0), dtype=float)
 
     @property
     def weather(self) -> pd.DataFrame:
@@ -135,11 +135,11 @@ class PlantTelemetry:
     @property
     def bought(self) -> FloatArray:
         """All that is bought, shape (n_time,) [W]."""
-        return np.sum([self.column(name) for name in CARRIERS], axis=0)
+        return np.asarray(np.sum([self.column(name) for name in CARRIERS], axis=0), dtype=float)
 
     def to_frame(self) -> pd.DataFrame:
         """Table for a file, in the units of case folders."""
-        return pd.DataFrame({c: _converted(c, self.frame[c], from_si) for c in self.frame}, index=self.frame.index)
+        return pd.DataFrame({c: _converted(str(c), self.frame[c], from_si) for c in self.frame}, index=self.frame.index)
 
 
 def facade_sun(location: Location, step: float, weather: pd.DataFrame) -> dict[str, FloatArray]:
@@ -193,7 +193,9 @@ def read_telemetry(path: Path, site: Site) -> PlantTelemetry:
         expected = "a .parquet or .csv file with a column 'timestamp'"
         raise PlantError(f"telemetry {path.name}", expected, " ".join(str(error).split())) from error
     steps = np.unique(np.diff(index.asi8))
-    PlantError.unless(len(steps) == 1 and steps[0] > 0, f"telemetry {path.name}", "regular stamps", f"{len(steps)} steps")
+    PlantError.unless(
+        len(steps) == 1 and steps[0] > 0, f"telemetry {path.name}", "regular stamps", f"{len(steps)} steps"
+    )
     step = float(steps[0] / np.timedelta64(1, "s").astype(f"timedelta64[{index.unit}]").astype(int))
     library = pd.DataFrame({str(c): _converted(str(c), values[c], to_si) for c in values}, index=index)
     return PlantTelemetry(library, step, site)
@@ -275,10 +277,10 @@ def on_control_steps(record: PlantRecord, step: float) -> PlantRecord:
     def mean(values: FloatArray | None) -> FloatArray | None:
         return None if values is None else values.reshape(-1, parts).mean(axis=1)
 
-    electricity = mean(record.electricity)
-    assert_sizes: Sequence[int] = (record.n_steps, parts)
-    PlantError.unless(electricity is not None, "record", "whole control steps", assert_sizes)
+    whole = parts >= 1 and record.n_steps % parts == 0
+    PlantError.unless(whole, "record", f"whole control steps of {step:g} s", f"{record.n_steps} of {record.step:g} s")
     return PlantRecord(
-        step, record.zone_temperature[::parts], np.asarray(electricity), mean(record.gas), mean(record.district_heating),
+        step, record.zone_temperature[::parts], np.asarray(mean(record.electricity)), mean(record.gas),
+        mean(record.district_heating),
         controller_seconds=record.controller_seconds,
     )  # fmt: skip

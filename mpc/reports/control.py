@@ -201,7 +201,8 @@ def trajectory(run: ControlRun) -> pd.DataFrame:
         columns[f"{zone}/comfort_upper_temperature"] = scenario.upper[:n, k] - CELSIUS
         columns[f"true/{zone}"] = record.zone_temperature[1:, k] - CELSIUS
     if isinstance(run.plant, RecordedPlant):  # with what was set and bought, `buildingmpc identify` can begin with it
-        columns |= {name: values.to_numpy() for name, values in run.plant.seen.to_frame().items() if name not in columns}
+        further = run.plant.seen.to_frame()
+        columns |= {str(name): further[name].to_numpy() for name in further if name not in columns}
     columns["electricity_price"], columns["gas_price"] = scenario.electricity_price[:n], scenario.gas_price[:n]
     columns["true/electricity"] = record.electricity
     columns["true/gas"] = np.zeros(n) if record.gas is None else record.gas

@@ -116,8 +116,8 @@ def identify_verdict(found: Identified, made: Experiment | None) -> str:
         best = min(last.persistence, last.arx)
         word = "better" if last.grey_box < best else "no better"
         text += (
-            f"the model predicts the zones {duration(last.lead)} ahead to {last.grey_box:.2f} K on days it has not seen, "
-            f"{word} than the best simple model ({best:.2f} K). "
+            f"the model predicts the zones {duration(last.lead)} ahead to {last.grey_box:.2f} K on days it has not "
+            f"seen, {word} than the best simple model ({best:.2f} K). "
         )
     else:
         text += "too short to hold days out, so that nothing is known of its errors. "
@@ -129,8 +129,8 @@ def identify_verdict(found: Identified, made: Experiment | None) -> str:
     if made is not None:
         k = experiment_kpis(made)
         text += (
-            f"The experiment spent {k.cost_tot * k.floor_area:.2f} {k.currency} on energy; zones were outside of their band "
-            f"by {significant(k.tdis_tot, 2)} K h on average, and the plant had its machines back for "
+            f"The experiment spent {k.cost_tot * k.floor_area:.2f} {k.currency} on energy; zones were outside of their "
+            f"band by {significant(k.tdis_tot, 2)} K h on average, and the plant had its machines back for "
             f"{percent(made.handed_back)} of the time."
         )
     return text.strip()
@@ -173,13 +173,15 @@ def _content(found: Identified, made: Experiment | None, command: str) -> dict[s
     box, index = found.model.box, found.telemetry.frame.index
     disturbance = box.disturbance
     machines = [
-        (m.machine.name, _OPERATION[m.operation], listed(m.machine.serves) if len(m.machine.serves) < 5 else "all zones",
+        (m.machine.name, _OPERATION[m.operation],
+         listed(m.machine.serves) if len(m.machine.serves) < 5 else "all zones",
          m.machine.heat or "not measured", significant(m.standing, 2),
          significant(m.efficiency(1.0), 3), significant(m.efficiency(0.5), 3))
         for m in found.model.maps
     ]  # fmt: skip
     zones = [
-        (zone, significant(box.heat_loss[k], 3), *(significant(box.capacity[n * len(box.zones) + k] / 3.6e6, 3) for n in range(4)))
+        (zone, significant(box.heat_loss[k], 3),
+         *(significant(box.capacity[n * len(box.zones) + k] / 3.6e6, 3) for n in range(4)))
         for k, zone in enumerate(box.zones)
     ]  # fmt: skip
     cards = [(f"{e.grey_box:.2f} K", f"mean error {duration(e.lead)} ahead, days held out") for e in found.errors]

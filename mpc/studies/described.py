@@ -51,7 +51,7 @@ class PlantStudy:
     start: str | None = None
     end: str | None = None
     model: PlantModel | None = None
-    settings: IdentifiedSettings = IdentifiedSettings()
+    settings: IdentifiedSettings = field(default_factory=IdentifiedSettings)
     actuators: tuple[str, ...] = ()
 
     decided = "the machines' runs and loads"
@@ -65,8 +65,8 @@ class PlantStudy:
     def _changes(self) -> dict[str, Any]:
         if self.start is None and self.end is None:
             return {}
-        both = self.start is not None and self.end is not None
-        PlantError.unless(both, "period", "--start and --end, or neither", f"{self.start} to {self.end}")
+        if self.start is None or self.end is None:
+            raise PlantError("period", "--start and --end, or neither", f"{self.start} to {self.end}")
         begin, end = pd.Timestamp(self.start), pd.Timestamp(self.end)
         days = (end - begin).total_seconds() / 86_400.0
         PlantError.unless(days > 0.0, "period", "an end after the start", f"{self.start} to {self.end}")
@@ -134,7 +134,7 @@ class PlantStudy:
         if self.model is None:
             raise ControlError("mpc", "a model of the plant", "none", "pass --model, from: buildingmpc identify")
         ControlError.unless(
-            abs(self.model.step - plant.control_step) < 1e-6, "mpc", f"control steps of {self.model.step:g} s as of the model",
+            abs(self.model.step - plant.control_step) < 1e-6, "mpc", f"steps of {self.model.step:g} s of its model",
             f"{plant.control_step:g} s", "identify the plant anew",
         )  # fmt: skip
         return IdentifiedController(self.model, plant.actuators, self.site.location, self.settings)
@@ -227,8 +227,8 @@ class SeenStudy:
         given = self.study.settings
         if self.study.model is None:
             return ()
-        found = [f"a start of a machine counts {given.start_price:g} {self.scenario.currency} for optimal control, and it "
-                 f"makes {given.starts} in 24 hours at most"]  # fmt: skip
+        found = [f"a start of a machine counts {given.start_price:g} {self.scenario.currency} for optimal control, and "
+                 f"it makes {given.starts} in 24 hours at most"]  # fmt: skip
         if given.guarantee is not None:
             asked = given.guarantee
             found.append(

@@ -137,7 +137,7 @@ def find_controller(name: str, subject: Subject = "any") -> RegisteredController
     ControlError
         When there is none of this name; with the nearest one.
     """
-    known = {n: entry for n, entry in REGISTERED.items() if "any" in (subject, entry.subject) or entry.subject == subject}
+    known = {n: e for n, e in REGISTERED.items() if "any" in (subject, e.subject) or e.subject == subject}
     ControlError.unless_known(name, known, "controller", f"one of {', '.join(known)}")
     return known[name]
 
@@ -209,8 +209,8 @@ def _own(study: PlantStudy, plant: Any) -> Controller:
 
 @register_controller(
     "full_speed", title="full speed with lead", subject="plant",
-    about="Machines run at full speed from the lower edge of the comfort band to half a kelvin above it, and not at all "
-    "otherwise; the edge is the highest of the next three hours, so that zones are set back in between.",
+    about="Machines run at full speed from the lower edge of the comfort band to half a kelvin above it, and not at "
+    "all otherwise; the edge is the highest of the next three hours, so that zones are set back in between.",
 )  # fmt: skip
 def _full_speed(study: PlantStudy, plant: Any) -> Controller:
     return study.full_speed(plant)

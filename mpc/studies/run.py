@@ -209,7 +209,8 @@ def _planned(action: PlannedAction) -> Decision:
     power = action.power[:row].mean(axis=0)
     powers = float(power[0]), float(power[1])
     told = str(solution.status), action.reasons
-    return Decision(action.stamp, action.source, *told, action.zone[min(row, len(action.zone) - 1)], powers, action.seconds)
+    zone = action.zone[min(row, len(action.zone) - 1)]
+    return Decision(action.stamp, action.source, *told, zone, powers, action.seconds)
 
 
 def prediction_errors(run: ControlRun) -> dict[str, Any]:
@@ -320,7 +321,9 @@ class Comparison:
         return (best.objective - run.objective) / (best.objective - bound.objective)
 
 
-def compare_controllers(study: Study | PlantStudy, names: Sequence[str], progress: Progress | None = None) -> Comparison:
+def compare_controllers(
+    study: Study | PlantStudy, names: Sequence[str], progress: Progress | None = None
+) -> Comparison:
     """Run several controllers on a study, one after the other.
 
     Parameters

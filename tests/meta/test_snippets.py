@@ -32,6 +32,7 @@ NOT_RUN = {
     "simulate": "takes the result of calibrate; run by tests/mpc/test_cli.py",
     "experiment": "takes the result of diagnose; run by tests/mpc/test_cli_experiment.py",
     "monitor": "minutes; run by tests/calibration/monitoring",
+    "identify": "half a minute; run by tests/mpc/adapters/described/test_identify_command.py",
     "control": "minutes; run by tests/mpc/test_cli_control.py",
     "compare": "minutes; run by tests/mpc/test_cli_control.py",
     "serve": "until it is interrupted; run by tests/mpc/test_cli_serve.py",

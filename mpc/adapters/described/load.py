@@ -126,7 +126,8 @@ def period_of(path: str | Path, file: PlantFile) -> tuple[pd.Timestamp, float]:
         unit = _place(path).parent / file.plant.file
         clock, span = YearClock(file.year, file.location.timezone), _Span(*unit_period(unit, file.period))
     else:
-        raise PlantError("period", "its start and days", f"{file.period!r}, which a server knows", "give --start and --end")
+        found = f"{file.period!r}, which a server knows"
+        raise PlantError("period", "its start and days", found, "give --start and --end")
     return clock.stamp(span.start), span.duration / DAY
 
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -25,6 +24,9 @@ from mpc.loop.plant import Measurements
 from mpc.scenario.forecast import Forecast
 from thermal._types import FloatArray
 from thermal.case.building import Location
+
+#: Share of a day's starts that may be used at once [-].
+_AT_ONCE = 1.0 / 3.0
 
 #: A duty above this is a run, a load below the other one is none [-].
 _HALF, _IDLE = 0.5, 0.02
@@ -61,11 +63,11 @@ class IdentifiedSettings:
 
 @dataclass
 class _Runs:
-    """What a machine has done: whether it runs, since how many steps, and steps of its starts."""
+    """What a machine has done: whether it runs, since how many steps, and starts that it has left."""
 
+    left: float
     on: bool = False
     since: int = 1_000_000
-    starts: deque[int] = field(default_factory=deque)
 
 
 class PlannedAction(dict[str, float]):
@@ -79,7 +81,10 @@ class PlannedAction(dict[str, float]):
         When the action begins.
     source, reasons : str and tuple of str
         ``optimal plan`` or ``rules``, and why.
-    solution : StageSolution, optional
+
+    Attributes
+    ----------
+    solution : StageSolution or None
         Of the solver.
     zone, power : ndarray
         Expected at the edges of the steps, shape (N + 1, n_zone) [K], and electricity and other carriers over them,
@@ -99,8 +104,10 @@ class IdentifiedController:
     """Plans a day ahead at every control step, on the grey box with its maps, and does the first step of the plan.
 
     A machine in duty runs whole steps. At each step the plan is solved twice: with the machine on for its shortest run,
-    and off; later steps stay relaxed. The cheaper of the two is done, starts at their price, which grows as the limit
-    of a day is used up: ``c n_max / (n_max - n)``. Deciding the first step by whole numbers and relaxing the rest is
+    and off; later steps stay relaxed. The cheaper of the two is done, starts at their price, which grows as the starts
+    that are left are used up. A third of a day's starts may be used at once, the others come back evenly over the day,
+    so that no 24 hours have more than the limit; a machine that goes off with less than one left is planned to stay off
+    until there is one. Deciding the first step by whole numbers and relaxing the rest is
     exact for the step that is done, as far as the relaxed rest is what will come.
 
     Parameters
@@ -134,9 +141,10 @@ class IdentifiedController:
         self._solver: StageSolver | None = None
         self._before: tuple[Ahead, FloatArray] | None = None
         self._plan: StageSolution | None = None
-        self._runs = [_Runs() for _ in model.maps]
+        self._most = max(_AT_ONCE * self.settings.starts, 1.0)
+        self._runs = [_Runs(self._most) for _ in model.maps]
         self._hold = max(round(self.settings.run / model.step), 1)
-        self._day = round(86_400.0 / model.step)
+        self._back = max(self.settings.starts - self._most, 0.0) * model.step / 86_400.0
         asked = self.settings.guarantee
         self.conformal = None if asked is None else ConformalBackOff(asked, self.settings.back_off)
         self.back_offs: list[float] = []
@@ -224,28 +232,27 @@ class IdentifiedController:
 
     def _possible(self, k: int) -> tuple[bool, ...]:
         """Whether a machine may be on or off next, by run times and the limit of starts."""
-        runs, now = self._runs[k], len(self.back_offs)
-        while runs.starts and runs.starts[0] <= now - self._day:
-            runs.starts.popleft()
+        runs = self._runs[k]
         if runs.since < self._hold:
             return (runs.on,)
-        return (False,) if not runs.on and len(runs.starts) >= self.settings.starts else (True, False)
+        return (False,) if not runs.on and runs.left < 1.0 else (True, False)
 
     def _block(self, k: int, on: bool) -> int:
-        """Steps that a choice holds: the shortest run or rest where it switches, what is left of it, else one."""
+        """Tell the steps that a choice holds: a shortest run, or a rest until there is a start again; else one."""
         runs = self._runs[k]
-        if on != runs.on:
-            return self._hold if on else 1
-        return max(self._hold - runs.since, 1)
+        if not on:
+            wait = (1.0 - runs.left) / self._back if self._back > 0.0 else np.inf if runs.left < 1.0 else 0.0
+            return int(np.clip(np.ceil(wait - 1e-9), 1, self._solver.n_steps if self._solver else 1))
+        return max(self._hold - runs.since, 1) if runs.on else self._hold
 
     def _starting(self, k: int, on: bool, found: StageSolution, steps: int) -> float:
-        """What starts cost that follow from a choice [currency].
+        """Price the starts that follow from a choice [currency].
 
         A machine that is off and will run later starts once either way. One that has run n steps shares its start among
         them: another step makes that c / n cheaper, which is what an end of the run forgoes.
         """
-        runs, limit = self._runs[k], self.settings.starts
-        price = self.settings.start_price * limit / max(limit - len(runs.starts), 1e-3)
+        runs = self._runs[k]
+        price = self.settings.start_price * self._most / max(runs.left, 0.5)
         if on:
             return 0.0 if runs.on else price
         later = float(found.decisions[steps:, k].sum())
@@ -276,13 +283,12 @@ class IdentifiedController:
 
     def _note(self, levels: FloatArray) -> None:
         """Write down which machines run."""
-        now = len(self.back_offs)
         for runs, found, level in zip(self._runs, self.model.maps, levels, strict=True):
             if found.operation != "duty":
                 continue
             on = bool(level > _HALF)
-            if on and not runs.on:
-                runs.starts.append(now)
+            started = float(on and not runs.on)
+            runs.left = min(runs.left - started + self._back, self._most)
             runs.since = 1 if on != runs.on else runs.since + 1
             runs.on = on
 
@@ -313,7 +319,7 @@ class IdentifiedController:
         return float(np.clip(value, low, high))
 
     def _powers(self, solution: StageSolution, ahead: Ahead) -> FloatArray:
-        """Expected electricity and other carriers, shape (N, 2) [W]."""
+        """Give expected electricity and other carriers, shape (N, 2) [W]."""
         emitter = REFERENCE + solution.states[:-1] @ self.model.box.emitter_weights
         powers = np.zeros((len(solution.decisions), 2))
         for carrier, base in self.model.base.items():
@@ -323,4 +329,3 @@ class IdentifiedController:
                 value: Any = found.at(curve, solution.decisions[:, k], ahead.outdoor, emitter[:, k])
                 powers[:, int(carrier != "electricity")] += value
         return powers
-

@@ -19,7 +19,7 @@ from thermal._types import FloatArray
 from thermal.case.building import Location
 from thermal.case.points import OUTDOOR_TEMPERATURE
 
-#: Cost is counted in parts of the currency, so that a day's is of order 1 to 100 as interior points like it [1/currency].
+#: Cost is counted in parts of the currency: a day's is of order 1 to 100, as interior points like it [1/currency].
 SCALE = 10.0
 
 #: Weight of the square of a decision [currency]: what costs the same whenever it is done is done evenly.
@@ -78,9 +78,15 @@ class Ahead:
             return forecast.values([name], fill="hold")[:, 0] if name in table else np.zeros(len(table))
 
         suns = facade_sun(location, model.step, table) if model.box.suns else {}
-        sun = np.column_stack([suns[name] for name in model.box.suns]) if suns else np.zeros((len(table), len(model.box.suns)))
+        sun = (
+            np.column_stack([suns[name] for name in model.box.suns])
+            if suns
+            else np.zeros((len(table), len(model.box.suns)))
+        )
         people = of_zones("occupancy_count_sensor") if f"{zones[0]}/occupancy_count_sensor" in table else None
-        gains = of_zones("internal_gain") if f"{zones[0]}/internal_gain" in table else np.zeros((len(table), len(zones)))
+        gains = (
+            of_zones("internal_gain") if f"{zones[0]}/internal_gain" in table else np.zeros((len(table), len(zones)))
+        )
         return cls(
             forecast.values([OUTDOOR_TEMPERATURE], fill="hold")[:, 0], np.nan_to_num(sun),
             gains + model.box.parts["constant gain"],
@@ -117,9 +123,7 @@ class IdentifiedProblem:
         nz, ns, m = len(box.zones), len(box.suns), len(model.maps)
         x, u = ca.SX.sym("x", 4 * nz), ca.SX.sym("u", m)
         p = ca.SX.sym("p", 1 + ns + nz + len(CARRIERS) + 2 * m)
-        outdoor, sun, gain, price, low, high = ca.vertsplit(
-            p, np.cumsum([0, 1, ns, nz, len(CARRIERS), m, m]).tolist()
-        )
+        outdoor, sun, gain, price, low, high = ca.vertsplit(p, np.cumsum([0, 1, ns, nz, len(CARRIERS), m, m]).tolist())
         chosen = low + (high - low) * u
         emitter = REFERENCE + ca.mtimes(ca.DM(box.emitter_weights.T), x)
         heats, cost = [], ca.SX(0)
@@ -135,7 +139,12 @@ class IdentifiedProblem:
         return StageProblem(x, u, p, following, cost, ca.SX(0), x[:nz], np.zeros(m), np.ones(m))
 
     def data(
-        self, state: FloatArray, ahead: Ahead, back_off: float, comfort_price: float, ends: tuple[FloatArray, FloatArray]
+        self,
+        state: FloatArray,
+        ahead: Ahead,
+        back_off: float,
+        comfort_price: float,
+        ends: tuple[FloatArray, FloatArray],
     ) -> StageData:
         """Put together what changes.
 
@@ -158,8 +167,12 @@ class IdentifiedProblem:
         gain = ahead.gain + keep[:, None] * state[nodes:]
         parameters = np.column_stack([ahead.outdoor, ahead.sun, gain, ahead.prices, *ends])
         # an edge lies in the bands of the step before and of the step after it; nothing can be done about the first
-        lower = np.vstack([ahead.lower[:1], np.maximum(ahead.lower[:-1], ahead.lower[1:]), ahead.lower[-1:]]) - REFERENCE
-        upper = np.vstack([ahead.upper[:1], np.minimum(ahead.upper[:-1], ahead.upper[1:]), ahead.upper[-1:]]) - REFERENCE
+        lower = (
+            np.vstack([ahead.lower[:1], np.maximum(ahead.lower[:-1], ahead.lower[1:]), ahead.lower[-1:]]) - REFERENCE
+        )
+        upper = (
+            np.vstack([ahead.upper[:1], np.minimum(ahead.upper[:-1], ahead.upper[1:]), ahead.upper[-1:]]) - REFERENCE
+        )
         narrow = np.minimum(back_off, 0.5 * (upper - lower) - 0.05)
         price = np.full((count + 1, zones), SCALE * comfort_price * step / HOUR)
         return StageData(state[:nodes], parameters, lower + narrow, upper - narrow, price)

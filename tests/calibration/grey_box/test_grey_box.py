@@ -19,7 +19,10 @@ STEP = 1800.0
 
 def two_zones() -> GreyBox:
     start = GreyBox.start(
-        {"north": 50.0, "south": 80.0}, ("sun from south",), {"floor": ("north", "south"), "heater": ("south",)}, (True, False)
+        {"north": 50.0, "south": 80.0},
+        ("sun from south",),
+        {"floor": ("north", "south"), "heater": ("south",)},
+        (True, False),
     )
     rng = np.random.default_rng(1)
     point = start.point + 0.3 * start.scale * rng.standard_normal(start.point.size)

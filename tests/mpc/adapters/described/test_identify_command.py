@@ -56,12 +56,20 @@ def test_identify_then_control(tmp_path: Path, make_house: Callable[..., Path]) 
     assert answer.exit_code == 0, answer.output
     told = json.loads(answer.stdout)
     assert told == json.loads((model / "identify.json").read_text()) and told["start"] == "2023-01-13T00:15:00+01:00"
-    assert sorted(p.name for p in model.iterdir()) == ["identify.json", "model.json", "report.html", "telemetry.parquet"]
+    assert sorted(p.name for p in model.iterdir()) == [
+        "identify.json",
+        "model.json",
+        "report.html",
+        "telemetry.parquet",
+    ]
     assert told["machines"][SPEED]["standing_power"] == pytest.approx(100.0, rel=0.01)
     assert told["machines"][SPEED]["efficiency"]["full"] == pytest.approx(8000.0 / (8000.0 / 3.0 + 100.0), rel=0.01)
     (found,) = read_model(model).maps
     assert found.operation == "duty" and told["experiment"]["kpis"]["tdis_tot"] < 1.0
-    assert "<h2>Machines</h2>" in (model / "report.html").read_text() and run("identify", plant, "--out", model).exit_code == 2
+    assert (
+        "<h2>Machines</h2>" in (model / "report.html").read_text()
+        and run("identify", plant, "--out", model).exit_code == 2
+    )
 
     span = ("--start", "2023-01-16 06:00", "--end", "2023-01-16 12:00")
     out = tmp_path / "control"
