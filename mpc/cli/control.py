@@ -34,7 +34,7 @@ class StudyOptions:
         str | None, value("Start, ISO 8601, local; of a plant.yaml by default that of its period.", "T")
     ] = None
     end: Annotated[
-        str | None, value("End; the telemetry of a case must hold the weather until then, if no --weather is given.", "T")
+        str | None, value("End; without --weather the telemetry of a case must hold the weather until then.", "T")
     ] = None
     model: Annotated[
         Path | None, value("Folder that `buildingmpc identify` wrote, for optimal control of a plant.yaml.", "DIR")

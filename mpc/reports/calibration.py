@@ -18,7 +18,6 @@ from mpc.reports.figures.field import spatial_field
 from mpc.reports.identifiability import information_content, information_sentences
 from mpc.reports.means import calibration_means, determined_words
 from mpc.reports.page import (
-    case_warnings,
     counted,
     duration,
     estimated_sentences,
@@ -28,6 +27,7 @@ from mpc.reports.page import (
     render,
 )
 from mpc.reports.residuals import diagnostics_content
+from mpc.reports.warnings import case_warnings
 from thermal.case.case import Case
 from thermal.model.case_replay import Inputs, replay_inputs
 from thermal.model.matrices import SymbolicModel

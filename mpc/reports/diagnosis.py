@@ -23,7 +23,8 @@ from mpc.reports.figures.errors import series_of_runs
 from mpc.reports.figures.plan import heat_maps
 from mpc.reports.figures.style import CELSIUS, Picture
 from mpc.reports.means_found import diagnosis_means
-from mpc.reports.page import case_warnings, kelvin, listed, render, significant, sure, unit
+from mpc.reports.page import kelvin, listed, render, significant, sure, unit
+from mpc.reports.warnings import case_warnings
 from thermal.case.building import FloorPlans
 from thermal.case.case import Case
 from thermal.effects.catalogue import CATALOGUE

@@ -17,9 +17,7 @@ from jinja2.filters import make_attrgetter
 from mpc.reports.display import display, write_results
 from mpc.reports.figures.zoom import zoom_scripts
 from mpc.reports.glossary import words_on
-from thermal.case.case import Case
 from thermal.case.estimated import Estimated, estimate_summary
-from thermal.case.validation import NO_WINDOWS, has_windows
 from thermal.parameters import FACADE_PREFIX
 
 _NO_NUMBER = "–"
@@ -108,19 +106,6 @@ def write_report(
         When the folder holds something and ``force`` is not set.
     """
     return write_results(out, {**files, "report.html": render(template, content)}, force) / "report.html"
-
-
-def case_warnings(case: Case) -> list[str]:
-    """Say what of a case spoils whatever is found with it, for the top of a page.
-
-    Parameters
-    ----------
-    case : Case
-        The case that a page is about.
-    """
-    named = case.path.name if case.path is not None else case.building.name
-    told = NO_WINDOWS.replace("CASE", named)
-    return [] if has_windows(case.building) else [f"{told[0].upper()}{told[1:]}."]
 
 
 def spell(value: Any, how: str = "") -> str:

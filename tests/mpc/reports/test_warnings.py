@@ -10,7 +10,8 @@ import pytest
 import calibration.fleet.run
 from calibration.fleet.case import CaseOutcome
 from mpc.cli import calibrate as _calibrate
-from mpc.reports.page import case_warnings, render
+from mpc.reports.page import render
+from mpc.reports.warnings import case_warnings
 from thermal import Case, FloorPlans, load_bundled_case
 
 
