@@ -15,7 +15,6 @@ from calibration.errors import CalibrationError
 from mpc import plugins
 from mpc.cli import options
 from mpc.cli.console import Progress, Waiting, answer, complain, say, show_table
-from thermal.case.validation import NO_WINDOWS
 
 if TYPE_CHECKING:
     from calibration.diagnosis.diagnosis import Diagnosis
@@ -209,6 +208,8 @@ def _many(
         elif outcome.solver is not None and outcome.status == "not_converged":
             name, status = outcome.solver["name"], outcome.solver["status"]
             complain(f"error: {outcome.case}: {name} did not converge: {status}; the results say so too")
+    from thermal.case.validation import NO_WINDOWS
+
     if blind := [outcome.case for outcome in outcomes if outcome.has_windows is False]:
         told = NO_WINDOWS.replace("the building has", f"{len(blind)} of {len(outcomes)} buildings have", 1)
         complain(f"warning: {', '.join(blind)}: {told}")

@@ -11,6 +11,7 @@ from mpc.identify.maps import EMITTER, OUTDOOR, interval_of
 from mpc.identify.model import FILE, PlantModel
 from mpc.kpi.kpis import Kpis, measure_kpis
 from mpc.reports.figures.identify import course_pictures, error_pictures, map_pictures
+from mpc.reports.means import Means
 from mpc.reports.page import clock, duration, listed, percent, render, significant
 from mpc.studies.described import Experiment
 
@@ -136,6 +137,27 @@ def identify_verdict(found: Identified, made: Experiment | None) -> str:
     return text.strip()
 
 
+def identify_means(found: Identified) -> Means:
+    """Say what an identified model means for who runs the plant.
+
+    Parameters
+    ----------
+    found : Identified
+        Of `identify`.
+    """
+    answer = f"The library has learnt how {found.model.name} warms up and what its machines draw, from "
+    answer += f"{duration(len(found.telemetry.frame) * found.telemetry.step)} of telemetry."
+    if not found.errors:
+        trust = "Nothing is known of its errors: the telemetry was too short to hold days out."
+    else:
+        last = found.errors[-1]
+        simple = min(last.persistence, last.arx)
+        trust = f"On days that it has not seen it is {last.grey_box:.2f} degrees C off {duration(last.lead)} ahead; "
+        trust += "simple models do no better." if last.grey_box < simple else "a simple model does better."
+    return Means(answer, trust, "Control the plant with it: buildingmpc control plant.yaml --model, and beside its own "
+                 "control: buildingmpc compare.")  # fmt: skip
+
+
 def identify_rows(found: Identified) -> list[tuple[str, float, float, float]]:
     """Rows of the table of errors.
 
@@ -190,7 +212,8 @@ def _content(found: Identified, made: Experiment | None, command: str) -> dict[s
         cards += [(f"{k.cost_tot * k.floor_area:,.2f} {k.currency}", "energy during the experiment"),
                   (f"{significant(k.tdis_tot, 2)} K h", "outside of the comfort band, mean zone")]  # fmt: skip
     return {
-        "title": f"Model of {found.model.name}", "verdict": identify_verdict(found, made), "cards": cards,
+        "title": f"Model of {found.model.name}", "means": identify_means(found), "cards": cards,
+        "verdict": identify_verdict(found, made),
         "subtitle": f"{clock(index[0])} to {clock(index[-1])}, held out from {clock(index[found.split])} on",
         "errors": [[duration(e.lead), f"{e.grey_box:.3f}", f"{e.bias:+.3f}".replace("-", "−"), f"{e.arx:.3f}",
                     f"{e.persistence:.3f}", str(e.count)] for e in found.errors],

@@ -28,7 +28,8 @@ def trials(package: Callable[[str], ModuleType]) -> Callable[[str], ModuleType]:
 @pytest.fixture(scope="module")
 def command(trials, script: Callable[[str], ModuleType]) -> ModuleType:
     trials("world")
-    for name in ("_table", "_code", "_trial_scores", "_trial_answers", "_trial_worlds", "_worlds"):
+    helpers = ("_table", "_code", "_seeds", "_trial_scores", "_trial_answers", "_leave_one_out", "spoilt_buildings")
+    for name in (*helpers, "_trial_worlds", "_worlds"):
         script(name)
     return script("blind_trials")
 

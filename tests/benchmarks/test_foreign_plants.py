@@ -161,7 +161,7 @@ def test_a_run_of_the_table(script: Callable[[str], ModuleType], models: Any, tm
                             monkeypatch: pytest.MonkeyPatch) -> None:  # fmt: skip
     for name in ("plants", "periods"):
         models(name)
-    for name in ("_code", "_table", "_foreign_rules", "_foreign_runs"):
+    for name in ("_code", "_table", "_foreign_rules", "_common_control", "_do_mpc_peer", "_foreign_do_mpc", "_foreign_runs"):
         script(name)
     table, runs = script("foreign_plants"), script("_foreign_runs")
     monkeypatch.setattr(runs, "DAYS", 1)

@@ -20,7 +20,7 @@ from thermal.case.building import Building, Device, Layer, Location, Surface, Zo
 @pytest.fixture(scope="module")
 def spoilt(script: Callable[[str], ModuleType], package: Callable[[str], ModuleType]) -> ModuleType:
     package("energyplus_trials.drawing")
-    for name in ("_table", "_code", "_trial_scores", "_trial_answers", "_trial_worlds", "_worlds", "blind_trials"):
+    for name in ("_table", "_code", "_seeds", "_trial_scores", "_trial_answers"):
         script(name)
     return script("spoilt_buildings")
 

@@ -17,7 +17,7 @@ from thermal.data import bundled_case_path
 CASE = str(bundled_case_path())
 EPILOGS = (
     *("check", "simulate", "evaluate", "calibrate", "diagnose", "demo", "doctor", "import-plan", "import-devices"),
-    *("control", "compare", "serve", "label", "import-telemetry", "effects", "experiment", "monitor"),
+    *("control", "compare", "serve", "label", "import-telemetry", "effects", "experiment", "monitor", "identify"),
 )
 
 

@@ -74,7 +74,7 @@ def parameter_ranges(parameters: Sequence[ParameterEstimate]) -> list[Picture]:
         shown = sorted(shown, key=lambda p: not p.identifiable)[:MOST_ROWS]
     if not shown:
         return []
-    figure, axes = panel(7.4, 0.9 + 0.3 * len(shown))
+    figure, axes = panel(7.4, 1.6 + 0.3 * len(shown))
     paper = paper_values(parameters)
     for row, p in enumerate(shown):
         _row(axes, row, p, paper.get(p.name))

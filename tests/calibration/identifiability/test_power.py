@@ -60,10 +60,10 @@ def test_at_the_start_it_is_the_information_of_the_problem() -> None:
 
 
 def test_errors_do_not_enter() -> None:
-    """Other measured temperatures at the targets, the same starts: the answer is the same to round-off."""
+    """Other measured temperatures at the targets, as steady, the same starts: the answer is the same to round-off."""
     p = problem()
     rng = np.random.default_rng(0)
-    noisy = replace(p, inputs=replace(p.inputs, zone=p.inputs.zone + rng.standard_normal(p.inputs.zone.shape)))
+    noisy = replace(p, inputs=replace(p.inputs, zone=p.inputs.zone + rng.standard_normal(p.inputs.zone.shape[1])))
     z, deviation = p.point(p.start), np.full(p.inputs.zone.shape[1], 0.3)
     one, other = (_information(q, z, deviation) for q in (p, noisy))
     assert [q.ratio for q in one.parameters] == pytest.approx([q.ratio for q in other.parameters], rel=1e-12)
@@ -76,8 +76,10 @@ def test_rows_are_told_apart_by_zone() -> None:
     gappy = replace(p, inputs=replace(p.inputs, zone=zone))
     model = reduced_model(p.grid, [p.start])
     found = _zones_of_rows(gappy, model, p.point(p.start))
-    count = sum(r.starts.size for r in p.runs) * p.keep.size
-    assert np.bincount(found).tolist() == [count, count - 1, count, count, count]
+    whole = np.bincount(_zones_of_rows(p, model, p.point(p.start)))
+    assert (whole - np.bincount(found)).tolist() == [0, 1, 0, 0, 0]
+    most = sum(r.starts.size for r in p.runs) * p.keep.size
+    assert np.all((0.98 * most < whole) & (whole <= most))  # but for steps that change too fast to be told
 
 
 def test_twice_the_error_is_a_quarter_of_the_information() -> None:
@@ -89,7 +91,9 @@ def test_twice_the_error_is_a_quarter_of_the_information() -> None:
 
 
 def test_a_zone_that_is_hardly_measured_tells_nothing() -> None:
-    """A zone with an error of 1000 K adds what it would add unmeasured, up to how many observations all count for."""
+    """A zone with an error of 1000 K adds what it would add unmeasured, up to how many observations all count for:
+    of its rows a few less are left out as too fast.
+    """
     p = problem()
     z, zones = p.point(p.start), p.inputs.zone.shape[1]
     given = np.full(zones, 0.3)
@@ -98,7 +102,7 @@ def test_a_zone_that_is_hardly_measured_tells_nothing() -> None:
     zone[:, 2] = np.nan
     without = replace(p, inputs=replace(p.inputs, zone=zone))
     one, other = _information(p, z, given), _information(without, z, np.full(zones, 0.3))
-    assert [q.ratio for q in one.parameters] == pytest.approx([q.ratio for q in other.parameters], rel=1e-4)
+    assert [q.ratio for q in one.parameters] == pytest.approx([q.ratio for q in other.parameters], rel=1e-3)
 
 
 def test_least_and_most_hold_the_start_and_sentences_say_it() -> None:

@@ -10,6 +10,7 @@ import pytest
 import calibration.fleet.run
 from calibration.fleet.case import CaseOutcome
 from mpc.cli import calibrate as _calibrate
+from mpc.reports.means import Means
 from mpc.reports.page import render
 from mpc.reports.warnings import case_warnings
 from thermal import Case, FloorPlans, load_bundled_case
@@ -28,9 +29,10 @@ def test_a_page_begins_with_what_spoils_its_numbers(dark: Case) -> None:
     assert case_warnings(load_bundled_case()) == []
     (told,) = case_warnings(dark)
     assert told.startswith("The building has no windows") and "buildingmpc label where," in told
-    page = render("base", {"subtitle": "", "verdict": "It fits.", "warnings": [told]})
+    means = Means("It fits.", "On few days.", "Go on.")
+    page = render("base", {"subtitle": "", "verdict": "It fits well.", "warnings": [told], "means": means})
     assert '<p class="warning" role="alert">The building has no windows' in page
-    assert page.index("It fits.") < page.index("no windows")
+    assert page.index("It fits well.") < page.index("no windows")
 
 
 def test_a_folder_of_cases_says_which_have_none(
