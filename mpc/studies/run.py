@@ -26,7 +26,7 @@ from mpc.studies.registry import RegisteredController, find_controller
 from mpc.studies.study import Study
 from thermal._types import FloatArray
 
-#: Time that a run with optimal control takes, in those with a rule [-]: a day of the bundled case, 9 s and 0.4 s.
+#: Time that a run with optimal control takes, in those with a rule [-]: a guess, by which progress alone is told.
 _SLOWNESS = 20.0
 
 #: How far ahead predictions are kept to be compared with what came [s].
