@@ -34,22 +34,6 @@ AHEAD = Horizon.growing([(2.0, 900.0), (10.0, 1800.0)], [0.5, 0.5, 1.0, 1.0, 2.0
 WATER = (323.15, 355.35)  # K: no warmer than the building's own
 
 
-class Own:
-    """The building's own control: nothing is overridden."""
-
-    def step(self, measurements: Measurements, forecast: Forecast | None) -> dict[str, float]:
-        """Choose nothing.
-
-        Parameters
-        ----------
-        measurements : Measurements
-            Without effect.
-        forecast : Forecast or None
-            Without effect.
-        """
-        return {}
-
-
 class MeasuredBoundaries:
     """Signals of a controller's model whose boundaries beside outdoor are measured: their last values are held.
 

@@ -17,13 +17,14 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import pandas as pd
-from _energyplus_control import COMFORT_PRICE, Own, optimal
+from _energyplus_control import COMFORT_PRICE, optimal
 from _energyplus_offices import CONTROL_STEPS, HORIZON, OFFICES, STEP, Office, prepared
 from _modelled_office import ModelledOffice, modelled_building
 from _site import POLICIES, Site, Week, World
 
 from mpc.adapters.energyplus.building import energyplus_building
 from mpc.adapters.energyplus.plant import EnergyPlusPlant
+from mpc.baselines.plants import OwnControl
 from mpc.baselines.rules import OutdoorReset
 from mpc.environment.environment import ScenarioPlant
 from mpc.loop.plant import Controller
@@ -96,7 +97,7 @@ class MediumOfficeSite(Site):
             model = models()[season_of(plant)][name.removeprefix("mpc_")]
             return optimal(plant, model["values"], model["effects"], price)
         if name == "own":
-            return Own()
+            return OwnControl()
         if name == "reset":
             return OutdoorReset(plant.actuators, plant.source.building.weather_station)
         air = [a for a in plant.actuators if a.name in self.actions]

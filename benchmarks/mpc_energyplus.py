@@ -31,11 +31,12 @@ from typing import Any
 
 import numpy as np
 from _code import code
-from _energyplus_control import Own, optimal
+from _energyplus_control import optimal
 from _energyplus_offices import CONTROL_DAYS, HORIZON, OFFICES, Office, prepared
 from _table import markdown, write
 
 from mpc.adapters.energyplus.plant import EnergyPlusPlant
+from mpc.baselines.plants import OwnControl
 from mpc.baselines.rules import OutdoorReset
 from mpc.errors import EnergyPlusError
 from mpc.kpi.kpis import measure_kpis
@@ -50,7 +51,7 @@ KILOWATT_HOUR = 3.6e6  # J
 def controller_of(name: str, plant: EnergyPlusPlant, models: dict[str, Any]) -> Any:
     """Make a controller by name."""
     if name == "own":
-        return Own()
+        return OwnControl()
     if name == "reset":
         return OutdoorReset(plant.actuators, plant.source.building.weather_station)
     return optimal(plant, models[name]["values"], models[name]["effects"])

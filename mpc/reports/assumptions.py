@@ -31,18 +31,27 @@ def assumption_rows(study: Study | SeenStudy) -> list[tuple[str, str]]:
 def _of_plant(study: SeenStudy) -> list[tuple[str, str]]:
     """Of a described plant: its description says all, and each edge of a band by the hour."""
     scenario, n = study.scenario, study.steps
-    currency = scenario.currency
     bands = [f"{_span(edge[:n] - _CELSIUS)} °C" for edge in (scenario.lower, scenario.upper)]
-    rows = [
+    return [
         ("plant", f"Simulated, not a real building: {study.setup}."),
-        ("electricity price", f"{listed_prices(scenario.electricity_price[:n], currency)} per kWh"),
-        ("gas price", f"{listed_prices(scenario.gas_price[:n], currency)} per kWh of upper heating value"),
-        ("currency", f"{currency}, as the description has it; nothing is converted"),
+        *_prices(study),
+        ("currency", f"{scenario.currency}, as the description has it; nothing is converted"),
         ("comfort band", f"lower edge {bands[0]}, upper edge {bands[1]}, by the hour as described"),
-        ("price of discomfort", f"{study.comfort_price:g} {currency} for a zone's kelvin outside of its band for an "
-         "hour: what optimal control weighs energy against; it is on no bill"),
-    ]  # fmt: skip
-    return rows
+        _discomfort(study),
+    ]
+
+
+def _prices(study: Study | SeenStudy) -> list[tuple[str, str]]:
+    scenario, n = study.scenario, study.steps
+    both = (scenario.electricity_price, scenario.gas_price)
+    electricity, gas = (listed_prices(of[:n], scenario.currency) for of in both)
+    return [("electricity price", f"{electricity} per kWh"), ("gas price", f"{gas} per kWh of upper heating value")]
+
+
+def _discomfort(study: Study | SeenStudy) -> tuple[str, str]:
+    price = f"{study.comfort_price:g} {study.scenario.currency}"
+    return ("price of discomfort", f"{price} for a zone's kelvin outside of its band for an hour: what optimal control "
+            "weighs energy against; it is on no bill")  # fmt: skip
 
 
 def _of_case(study: Study) -> list[tuple[str, str]]:
@@ -59,16 +68,14 @@ def _of_case(study: Study) -> list[tuple[str, str]]:
         ("weather", f"{weather}; forecasts "
          f"{'with the errors of a day-ahead forecast' if given.errors else 'perfect'}."),
         ("tariff", given.tariff.name or "given"),
-        ("electricity price", f"{listed_prices(scenario.electricity_price[:n], currency)} per kWh"),
-        ("gas price", f"{listed_prices(scenario.gas_price[:n], currency)} per kWh of upper heating value"),
+        *_prices(study),
         ("demand charges", "; ".join(demand) or "none"),
         ("fixed charges, taxes", "left out: no controller changes them"),
         ("currency", f"{currency}, as the tariff has it; nothing is converted"),
         ("occupancy", _people_words(scenario.people, scenario.assigned, scenario.floor_area)),
         ("internal gains", _gain_words(heat.sensible, heat.equipment, heat.lights)),
         ("comfort band", comfort_band_words(given.comfort or ComfortBand())),
-        ("price of discomfort", f"{given.comfort_price:g} {currency} for a zone's kelvin outside of its band for an "
-         "hour: what optimal control weighs energy against; it is on no bill"),
+        _discomfort(study),
     ]  # fmt: skip
     if scenario.carbon_kind:
         rows.append(("emissions", f"electricity {_span(emissions)} g CO₂ per kWh ({scenario.carbon_kind}), gas "

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from thermal.components.component import Actuator, Conditions, Given, Port, Range, State
+from thermal.components.component import Actuator, Conditions, Port, Range, State
 from thermal.components.curves import ORDINARY_BOILER, Biquadratic, celsius
 from thermal.components.energy_balance import EnergyBalance
 from thermal.components.operations import Operations, Value
@@ -110,22 +110,3 @@ class BoilerLoop(WaterLoop):
             What `run` returned.
         """
         return super().energy(conditions, done)._replace(condenser=0.0, flue=done.outdoors)
-
-    def read(self, ops: Operations, given: Given, done: LoopStep) -> list[Value]:
-        """Values of its points.
-
-        Parameters
-        ----------
-        ops : Operations
-            Arithmetic.
-        given : Given
-            As `run` had it.
-        done : LoopStep
-            What `run` returned.
-        """
-        held = given.actions["differential_pressure_setpoint"]
-        return [
-            given.actions["supply_water_temperature_setpoint"], done.supply_water_temperature,
-            done.return_water_temperature, done.fuel_power, done.pump_power, held,
-            given.actions["boiler_running"] * held,
-        ]  # fmt: skip

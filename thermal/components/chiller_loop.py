@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from thermal.components.component import Actuator, Conditions, Given, Port, Range, State
+from thermal.components.component import Actuator, Conditions, Port, Range, State
 from thermal.components.cooling_tower import CoolingTower, TowerStep
 from thermal.components.curves import CHILLER_CAPACITY, CHILLER_INPUT, CHILLER_PART_LOAD
 from thermal.components.machine_map import MachineMap, MachineStep
 from thermal.components.moist_air import wet_bulb
 from thermal.components.operations import Operations, Value
 from thermal.components.pump import Pump
-from thermal.components.water_loop import SHORT_PIPES, LoopStep, Production, WaterLoop
+from thermal.components.water_loop import SHORT_PIPES, Production, WaterLoop
 
 _PASSES = 2  # chiller, tower, chiller: the condenser's water moves by less than 0.1 K in the last
 
@@ -133,17 +133,3 @@ class ChillerLoop(WaterLoop):
         """
         done, tower = self.chilled(ops, produced, water, conditions)
         return Production(done.power + tower.power + done.duty * self.condenser_pump, duty=done.duty)
-
-    def read(self, ops: Operations, given: Given, done: LoopStep) -> list[Value]:
-        """Values of its points.
-
-        Parameters
-        ----------
-        ops : Operations
-            Arithmetic.
-        given : Given
-            As `run` had it.
-        done : LoopStep
-            What `run` returned.
-        """
-        return [done.supply_water_temperature, done.return_water_temperature, done.electric_power]

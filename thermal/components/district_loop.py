@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from thermal.components.component import Actuator, Conditions, Given, Port, Range, State
+from thermal.components.component import Actuator, Conditions, Port, Range, State
 from thermal.components.operations import Operations, Value
 from thermal.components.pump import Pump
-from thermal.components.water_loop import SHORT_PIPES, LoopStep, Production, WaterLoop
+from thermal.components.water_loop import SHORT_PIPES, Production, WaterLoop
 
 
 @dataclass(frozen=True)
@@ -98,22 +98,3 @@ class DistrictLoop(WaterLoop):
             Temperatures that the water is made with, and comes back with [K].
         """
         return Production(fuel_power=produced)
-
-    def read(self, ops: Operations, given: Given, done: LoopStep) -> list[Value]:
-        """Values of its points.
-
-        Parameters
-        ----------
-        ops : Operations
-            Arithmetic.
-        given : Given
-            As `run` had it.
-        done : LoopStep
-            What `run` returned.
-        """
-        held = given.actions["differential_pressure_setpoint"]
-        return [
-            given.actions["supply_water_temperature_setpoint"], done.supply_water_temperature,
-            done.return_water_temperature, done.fuel_power, done.pump_power, held,
-            given.actions["district_running"] * held,
-        ]  # fmt: skip

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from thermal.components.component import Actuator, Conditions, Given, Port, Range, State
+from thermal.components.component import Actuator, Conditions, Port, Range, State
 from thermal.components.curves import AIR_SOURCE_INPUT, DX_HEATING_CAPACITY, DX_PART_LOAD
 from thermal.components.machine_map import MachineMap
 from thermal.components.operations import Operations, Value
 from thermal.components.pump import Pump
-from thermal.components.water_loop import SHORT_PIPES, LoopStep, Production, WaterLoop
+from thermal.components.water_loop import SHORT_PIPES, Production, WaterLoop
 
 #: Air to water: COP of Staffell et al. (2012), defrosting in it; capacity as air-source direct expansion has it.
 AIR_TO_WATER = MachineMap(
@@ -120,21 +120,3 @@ class HeatPumpLoop(WaterLoop):
         source = self.source(conditions)
         done = self.machine.run_at(ops, produced, self.capacity, water, source, conditions.outdoor_humidity)
         return Production(done.power + produced - done.output, duty=done.duty)
-
-    def read(self, ops: Operations, given: Given, done: LoopStep) -> list[Value]:
-        """Values of its points.
-
-        Parameters
-        ----------
-        ops : Operations
-            Arithmetic.
-        given : Given
-            As `run` had it.
-        done : LoopStep
-            What `run` returned.
-        """
-        held = given.actions["differential_pressure_setpoint"]
-        return [
-            given.actions["supply_water_temperature_setpoint"], done.supply_water_temperature,
-            done.return_water_temperature, done.electric_power, held, given.actions["heat_pump_running"] * held,
-        ]  # fmt: skip

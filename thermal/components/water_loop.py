@@ -109,8 +109,8 @@ class LoopStep(NamedTuple):
 class WaterLoop(Component):
     """Water that is held at a setpoint and pumped to those that draw from it; the base of what makes it warm or cold.
 
-    A class of its own declares ports, one state, actuators - setpoint, pressure and switch - and sensors, and says
-    what it `can` bring and what that `takes`.
+    A class of its own declares ports, one state, actuators - setpoint, pressure and switch - and sensors among those
+    that `read` knows, and says what it `can` bring and what that `takes`.
 
     Parameters
     ----------
@@ -337,3 +337,31 @@ class WaterLoop(Component):
             electricity=done.electric_power, fuel=done.fuel_power, condenser=done.outdoors, plant_room=room,
             storage=done.storage,
         )  # fmt: skip
+
+    def read(self, ops: Operations, given: Given, done: LoopStep) -> list[Value]:
+        """Values of its points.
+
+        Parameters
+        ----------
+        ops : Operations
+            Arithmetic.
+        given : Given
+            As `run` had it.
+        done : LoopStep
+            What `run` returned.
+        """
+        setpoint, pressure, running = given.actions.values()
+        read = {
+            "supply_water_temperature_setpoint": setpoint,
+            "supply_water_temperature_sensor": done.supply_water_temperature,
+            "return_water_temperature_sensor": done.return_water_temperature,
+            "chilled_supply_water_temperature_sensor": done.supply_water_temperature,
+            "chilled_return_water_temperature_sensor": done.return_water_temperature,
+            "gas_power_sensor": done.fuel_power,
+            "heating_power_sensor": done.fuel_power,
+            "electrical_power_sensor": done.electric_power,
+            "pump_power_sensor": done.pump_power,
+            "differential_pressure_setpoint": pressure,
+            "differential_pressure_sensor": running * pressure,
+        }
+        return [read[point] for point in self.sensors]

@@ -63,8 +63,9 @@ def challenge(
     known = dict(rounds[0].before.effects)
     try:
         for effects, least in _rivals(rounds, known):
-            if zoned.fit(effects, [_values(final, effects)]).evidence >= least:
-                baseline = zoned.fit(known, [_values(final, known)])
+            other = zoned.fit(effects, [_values(final, effects)])
+            if other.evidence >= least:
+                baseline = other if effects == known else zoned.fit(known, [_values(final, known)])
                 return zoned, search(zoned, baseline, held_out(zoned, baseline), candidates, progress)
     except (ArithmeticError, np.linalg.LinAlgError, CalibrationError, ModelError):
         pass
