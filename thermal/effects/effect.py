@@ -29,6 +29,9 @@ _TABLE = tomllib.loads(files(__package__).joinpath("catalogue.toml").read_text(e
 #: Between the names of two zones, where a strength belongs to both.
 PAIR = " + "
 
+#: In the place of an effect's zones: all of them, with one strength.
+ALIKE = ("*",)
+
 
 @dataclass(frozen=True)
 class Effect:
@@ -130,7 +133,7 @@ class Chosen:
     effect : Effect
         Which.
     zones : tuple of str
-        Where; all zones when empty.
+        Where, with a strength each; all zones when empty. All of them with one strength: `ALIKE`.
     """
 
     effect: Effect
@@ -149,14 +152,16 @@ class Chosen:
         EffectError
             When a zone is not of the building, or the effect cannot be in some zones only.
         """
-        unknown = sorted(set(self.zones) - set(graph.zones))
+        alike = self.zones == ALIKE
+        unknown = [] if alike else sorted(set(self.zones) - set(graph.zones))
         if unknown:
             known = nearest(unknown[0], graph.zones)
             raise EffectError(f"effect {self.effect.id}: zones {unknown} are not of this building; {known}")
         if self.zones and not self.effect.zonal:
             found = f"zones {list(self.zones)}; leave them out"
             raise EffectError(f"effect {self.effect.id}: acts on the whole building, got {found}")
-        self.effect.build(EffectBuilder(graph, self.effect, self.zones or graph.zones))
+        zones = graph.zones if alike or not self.zones else self.zones
+        self.effect.build(EffectBuilder(graph, self.effect, zones, alike))
 
 
 class EffectBuilder:
@@ -170,10 +175,12 @@ class EffectBuilder:
         What is added.
     zones : tuple of str
         Where it may act.
+    alike : bool
+        Whether zones share what is a zone's otherwise.
     """
 
-    def __init__(self, graph: GraphBuilder, effect: Effect, zones: Sequence[str]) -> None:
-        self.graph, self.effect, self.anatomy = graph, effect, graph.anatomy
+    def __init__(self, graph: GraphBuilder, effect: Effect, zones: Sequence[str], alike: bool = False) -> None:
+        self.graph, self.effect, self.anatomy, self._alike = graph, effect, graph.anatomy, alike
         self.rooms: tuple[Room, ...] = tuple(graph.anatomy.rooms[z] for z in zones)
         self._count = 0
         self._keys: dict[int, tuple[str, ca.SX]] = {}
@@ -197,7 +204,7 @@ class EffectBuilder:
         if name not in own:
             raise EffectError(f"effect {self.effect.id}: has no parameter {name!r}; {nearest(name, own)}")
         found = own[name]
-        if zone is not None:
+        if zone is not None and not self._alike:
             found = found.of("zone", zone)
         elif facade is not None:
             found = found.of("facade", facade)

@@ -13,6 +13,7 @@ from calibration.diagnosis.refit.search import Round, accepted_from
 from calibration.diagnosis.screen.gains import Gain
 from calibration.diagnosis.screen.regular import Regular
 from thermal.effects.catalogue import CATALOGUE
+from thermal.effects.effect import ALIKE
 
 #: Standard deviations from the estimate to an end of a 90 % interval [-].
 _NINETY = 1.645
@@ -256,7 +257,8 @@ def _candidate(
     gain = best.screened if isinstance(best, Refit) else best
     home = next(r for r in rounds if any(found is best for found in (*r.gains, *r.refits)))
     group = group_of(home, effect)[: levels.LARGEST_GROUP]
-    return Candidate(effect, probability, score, group, gain.zones, _parameters(best, effect), gain.retained, told_by)
+    zones = () if gain.zones == ALIKE else gain.zones
+    return Candidate(effect, probability, score, group, zones, _parameters(best, effect), gain.retained, told_by)
 
 
 def _parameters(best: Gain | Refit, effect: str) -> dict[str, Estimate]:

@@ -127,12 +127,12 @@ def own_nulls(made: Screening, fit: Fit, candidates: Sequence[str]) -> OwnNulls:
 
 
 def _gains_of(made: Screening, effect: str, scores: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Gain and share of one effect in every draw: over the building, or in the zones where it explains most [-]."""
+    """Gain and share of one effect in every draw: over the building or zones, as `Screening.of` has it [-]."""
     if not CATALOGUE[effect].zonal:
         whole = made.programme.solve(made.strengths_of(effect), scores)
         return whole.gain, whole.share
     members, everywhere = made.members_of(effect)
-    found: list[Explained | Grown] = [made.programme.solve(everywhere, scores)] if everywhere.size else []
+    found: list[Explained | Grown] = [made.programme.solve(index, scores) for index in everywhere.values()]
     if members:
         found.append(made.programme.grow(list(members.values()), scores, len(members) + made.elsewhere))
     gains, shares = np.array([f.gain for f in found]), np.array([f.share for f in found])

@@ -20,7 +20,7 @@ from calibration.diagnosis.screen.generic import GENERIC, TIGHTNESS, ZONE_HEAT
 from calibration.diagnosis.screen.programme import Programme
 from thermal._types import BoolArray, FloatArray, IntArray
 from thermal.effects.catalogue import CATALOGUE
-from thermal.effects.effect import PAIR, Chosen
+from thermal.effects.effect import ALIKE, PAIR, Chosen
 from thermal.model.reduce import FEW_SHIFTS, SHIFTS, reduced_model
 from thermal.parameters import Parameter
 
@@ -70,7 +70,11 @@ class Screening:
             low, high = (problem.residuals_only(model, end + little) for end in (theta, other))
             jacobian = np.column_stack([jacobian, jacobian[:, i] + (high - low) / little[i]])
         self._twins = {len(own) + k: i for k, i in enumerate(twice)}
-        self.parameters = (*own, *(replace(own[i], name=f"{own[i].name} at the other end") for i in twice))
+        tied = {} if here else _tied(own, [e for e in lacking if CATALOGUE[e].zonal])
+        self._tied = range(len(own) + len(twice), len(own) + len(twice) + len(tied))
+        jacobian = np.column_stack([jacobian, *(jacobian[:, mine].sum(axis=1) for mine in tied.values())])
+        at_the_end = (replace(own[i], name=f"{own[i].name} at the other end") for i in twice)
+        self.parameters = (*own, *at_the_end, *tied)
         self.jacobian = jacobian
         error = fit.problem.residuals_only(fit.model, fit.theta)
         self.count = problem.effective_size()
@@ -81,7 +85,7 @@ class Screening:
         self.lower = np.array([p.lower for p in self.parameters])
         self.upper = np.array([p.upper for p in self.parameters])
         self._start = np.array([p.transform(p.start) for p in self.parameters])
-        self._point = np.concatenate([problem.point(theta), np.zeros(len(twice))])
+        self._point = np.concatenate([problem.point(theta), np.zeros(len(twice) + len(tied))])
         self._whole, self._slope = gram, score
         self._project(np.array([p.name in fit.values for p in self.parameters]))
 
@@ -141,7 +145,7 @@ class Screening:
         return less
 
     def of(self, effect: str) -> Gain:
-        """Gain of one effect: over the building, or in the zones where it explains most.
+        """Gain of one effect: over the building, or in the zones where it explains most, or in all with one strength.
 
         Parameters
         ----------
@@ -154,11 +158,10 @@ class Screening:
             return self._gain(effect, self.strengths_of(effect), ())
         members, everywhere = self.members_of(effect)
         found = [self._grow(effect, members)] if members else []
-        if everywhere.size:
-            found.append(self._gain(effect, everywhere, ()))
+        found += [self._gain(effect, index, zones) for zones, index in everywhere.items()]
         return max(found, key=lambda g: g.gain)
 
-    def members_of(self, effect: str) -> tuple[dict[str, IntArray], IntArray]:
+    def members_of(self, effect: str) -> tuple[dict[str, IntArray], dict[tuple[str, ...], IntArray]]:
         """Positions of an effect's strengths by zone or pair of zones, those that show nothing left out.
 
         Parameters
@@ -169,15 +172,19 @@ class Screening:
         Returns
         -------
         tuple
-            By zone or pair, and those that all zones share.
+            By zone or pair; and those that all zones share, alone and with the zones' own made alike.
         """
         members: dict[str, list[int]] = {}
+        tied = [int(i) for i in self.strengths_of(effect) if i in self._tied]
         for i in self.strengths_of(effect):
-            members.setdefault(self.parameters[i].member or "", []).append(int(i))
-        everywhere = members.pop("", [])
+            if i not in self._tied:
+                members.setdefault(self.parameters[i].member or "", []).append(int(i))
+        shared = members.pop("", [])
+        ways = {(): shared, ALIKE: [*shared, *tied] if tied else []}
+        everywhere = {zones: np.array(index, dtype=np.int64) for zones, index in ways.items() if index}
         silent = [name for name, mine in members.items() if not self._whole[mine, mine].any()]
         shown = {n: np.array(i) for n, i in members.items() if n not in silent or len(silent) == len(members)}
-        return shown, np.array(everywhere, dtype=np.int64)
+        return shown, everywhere
 
     def promised(self, *gains: Gain) -> dict[str, float]:
         """Parameters where the tangents point: the effects' strengths, and what the fitted ones then would be.
@@ -326,6 +333,15 @@ class Screening:
         kept = float(along @ self.gram @ along) / whole if whole > 0.0 else 0.0
         strengths, errors = self._named(effect, index, x, np.asarray(np.linalg.inv(sharper)))
         return Gain(effect, zones, gain - choice, share, strengths, errors, kept, direction, index, places, choice)
+
+
+def _tied(parameters: Sequence[Parameter], effects: Sequence[str]) -> dict[Parameter, list[int]]:
+    """Strengths that zones share where they are alike, with the positions of those that are made one."""
+    found: dict[Parameter, list[int]] = {}
+    for i, p in enumerate(parameters):
+        if p.effect in effects and p.member is not None and is_strength(p.name, p.effect):
+            found.setdefault(replace(p, name=p.base, scope="global", member=None), []).append(i)
+    return {p: mine for p, mine in found.items() if len(mine) > 1}
 
 
 def _worst_zones(fit: Fit) -> tuple[str, ...]:
