@@ -11,9 +11,9 @@ import numpy as np
 import pint
 import pytest
 
-from thermal import Case, FloorPlans, Telemetry, ZoneTable, build_network
+from thermal import Case, FloorPlans, SymbolicModel, Telemetry, ZoneTable, build_network
 from thermal.effects.catalogue import CATALOGUE, chosen, register_effect
-from thermal.effects.effect import Chosen, Effect, EffectBuilder
+from thermal.effects.effect import ALIKE, Chosen, Effect, EffectBuilder
 from thermal.errors import EffectError
 from thermal.inputs.normalisation import WIND
 from thermal.inputs.provider import INFRARED, IRRADIANCE, InputProvider, telemetry_inputs
@@ -84,6 +84,25 @@ def test_where_an_effect_cannot_be(lively_case: CaseOf, effects: dict[str, list[
 def test_an_effect_of_some_zones_has_their_parameters(lively_case: CaseOf) -> None:
     network = build_network(lively_case("plan").building, effects=(Chosen(CATALOGUE["flow_gain"], ("C", "B")),))
     assert {p.name for p in network.parameters if p.effect} == {"flow_gain@B", "flow_gain@C"}
+
+
+@pytest.mark.parametrize("name", [name for name, effect in CATALOGUE.items() if effect.zonal])
+def test_zones_that_are_alike_are_those_with_the_same_strengths(name: str, lively_case: CaseOf) -> None:
+    building = lively_case("plan").building
+    apart, alike = (build_network(building, effects=(Chosen(CATALOGUE[name], where),)) for where in ((), ALIKE))
+    base = {p.name: p for p in CATALOGUE[name].parameters}
+    assert {p.name for p in alike.parameters if p.effect == name} <= set(base)
+    assert {p.base for p in apart.parameters if p.effect == name} == {
+        p.name for p in alike.parameters if p.effect == name
+    }
+    at = {n: p.start + 0.3 * (p.upper - p.start) for n, p in base.items()}
+    found = []
+    for network in (apart, alike):
+        values = {p.name: at[p.base] for p in network.parameters if p.effect == name}
+        made = SymbolicModel(network).matrices(network.values(values))
+        found.append((made.flow.toarray(), made.capacity.toarray()))
+    for one, other in zip(*found, strict=True):
+        assert one.shape == other.shape and np.abs(one - other).max() <= 1e-12 * np.abs(one).max()
 
 
 def reasons(case: Case) -> dict[str, str]:

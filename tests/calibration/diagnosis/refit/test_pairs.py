@@ -18,10 +18,13 @@ from calibration.diagnosis.screen.gains import MATTERS, Gain, choice_of
 from calibration.diagnosis.screen.own_nulls import OwnNulls
 from calibration.diagnosis.screen.screen import Screening
 from calibration.evaluation.settings import ModelSettings
-from thermal import Case, Telemetry
+from thermal import Case, FloorPlans, Telemetry
+from thermal.case.plan import zone_floor_areas
 from thermal.effects.catalogue import CATALOGUE
+from thermal.effects.effect import ALIKE
 from thermal.pilot.building import pilot_building
 from thermal.pilot.twin import TwinRanges, TwinSettings, generate_twin
+from thermal.units import AIR_HEAT_CAPACITY
 
 FloatArray = NDArray[np.float64]
 
@@ -47,7 +50,7 @@ def screening(signatures: FloatArray, errors: FloatArray, fitted: Mapping[str, f
     made.lower = np.array([p.lower for p in made.parameters])
     made.upper = np.array([p.upper for p in made.parameters])
     made.elsewhere = 0
-    made._levels, made._twins = {}, {}
+    made._levels, made._twins, made._tied = {}, {}, range(0)
     made._whole, made._slope = made.scale * signatures.T @ signatures, -made.scale * signatures.T @ errors
     made._start, made._point = np.zeros(len(NAMES)), np.array([(fitted or {}).get(name, 0.0) for name in NAMES])
     made._project(np.array([name in (fitted or {}) for name in NAMES]))
@@ -124,13 +127,18 @@ def test_a_screening_less_an_effect_is_that_of_the_model_without_it() -> None:
         assert less.promised(one) == pytest.approx(alone.promised(other), rel=1e-6)
 
 
-def biased_and_misread() -> tuple[ModelComparison, str, str]:
-    """A twin whose meter of one zone reads low and whose sensor of another reads high; the two zones."""
+def quiet_twin() -> Case:
+    """A twin that lacks nothing."""
     building = pilot_building(3, floor_area=120.0, zones=4, floors=1, name="office")
     quiet = TwinRanges(disturbance_deviation=(0.05, 0.1), noise=(0.005, 0.01))
-    case = generate_twin(building, 3, TwinSettings(days=15.0, step_seconds=900.0, dx=1.0, meter="exact", ranges=quiet))[
-        0
-    ]
+    settings = TwinSettings(days=15.0, step_seconds=900.0, dx=1.0, meter="exact", ranges=quiet)
+    return generate_twin(building, 3, settings)[0]
+
+
+def biased_and_misread() -> tuple[ModelComparison, str, str]:
+    """A twin whose meter of one zone reads low and whose sensor of another reads high; the two zones."""
+    case = quiet_twin()
+    building = case.building
     low, high = building.zone_names[1], building.zone_names[3]
     frame = case.telemetry.frame.copy()
     (device,) = building.devices_of(low)
@@ -204,6 +212,32 @@ def test_a_pair_is_accepted_where_neither_member_would_be() -> None:
     assert both.gain > 2.0 * ACCEPTED > first.gain
     assert both.fit.values[f"flow_gain@{low}"] == pytest.approx(ERROR, abs=0.05)
     assert both.fit.values[f"sensor_bias@{high}"] == pytest.approx(BIAS, abs=0.1)
+
+
+def test_what_all_zones_have_alike_is_one_strength() -> None:
+    """Every valve leaks as much that no meter sees: a strength a zone is too dear, one for all is found and fitted."""
+    clean, leak = quiet_twin(), 4.0
+    frame, building = clean.telemetry.frame.copy(), clean.building
+    assert isinstance(building.geometry, FloorPlans)
+    areas = zone_floor_areas(building.geometry)
+    for zone in building.zone_names:
+        (device,) = building.devices_of(zone)
+        flow = frame[f"{device.name}/supply_air_flowrate_sensor"]
+        heat = AIR_HEAT_CAPACITY * flow.where(flow > 0.0, np.inf)
+        frame[f"{device.name}/discharge_air_temperature_sensor"] -= leak * areas[zone] / heat
+    models = ModelComparison(Case(building, Telemetry.from_frame(frame)), ModelSettings(dx=1.0))
+    baseline = models.fit({}, [{}])
+    made = Screening(models, baseline, ("valve_leak",))
+    members, everywhere = made.members_of("valve_leak")
+    columns = np.concatenate(list(members.values()))
+    assert made.jacobian is not None
+    assert made.jacobian[:, everywhere[ALIKE]][:, 0] == pytest.approx(made.jacobian[:, columns].sum(axis=1))
+    gain = made.of("valve_leak")
+    assert gain.zones == ALIKE and list(gain.strengths) == ["valve_leak"]
+    assert gain.gain > made._grow("valve_leak", members).gain
+    found = Work(models, baseline, held_out(models, baseline), made).refit([gain], made.promised(gain))
+    assert found is not None and found.fit.effects == {"valve_leak": ALIKE} and found.counts
+    assert found.fit.values["valve_leak"] == pytest.approx(leak, rel=0.2)
 
 
 def test_what_promises_to_matter_little_is_not_fitted() -> None:
