@@ -27,7 +27,7 @@ def made(seed: int = 1) -> tuple[Screening, FloatArray]:
     found.prior = np.array([p.prior_deviation for p in found.parameters])
     found.lower, found.upper = (np.array([getattr(p, end) for p in found.parameters]) for end in ("lower", "upper"))
     found.elsewhere = 0
-    found._levels, found._twins = {}, {}
+    found._levels, found._twins, found._tied = {}, {}, range(0)
     found._whole, found._slope = found.scale * signatures.T @ signatures, -found.scale * signatures.T @ errors
     found._start = found._point = np.zeros(n)
     found._project(np.arange(n) == n - 1)
