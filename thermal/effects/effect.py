@@ -61,6 +61,9 @@ class Effect:
         Point types of the weather station that it cannot do without.
     zonal : bool
         Whether it may be there in some zones only; it then has a strength a zone.
+    alike : bool
+        Whether one cause may give it to all zones with one strength: doors that are kept open, water that is too cold,
+        a factor in all meters. Valves leak and sensors drift one by one.
     requires : tuple of str
         Effects that it modifies, and without which it means nothing.
     applies : callable, optional
@@ -88,6 +91,7 @@ class Effect:
     build: Builder
     needs: tuple[str, ...] = ()
     zonal: bool = False
+    alike: bool = False
     requires: tuple[str, ...] = ()
     applies: Callable[[Anatomy], str | None] | None = None
     shifts: tuple[str, ...] = ()

@@ -19,6 +19,7 @@ from calibration.diagnosis.screen.own_nulls import OwnNulls, own_nulls
 from calibration.diagnosis.screen.screen import Screening, screen
 from calibration.progress import Forward, Progress
 from thermal.effects.catalogue import CATALOGUE
+from thermal.effects.effect import ALIKE
 
 #: Most rounds, and most effects that a round fits anew.
 ROUNDS, MOST_REFITS = 8, 4
@@ -237,8 +238,9 @@ def _refits(work: Work, gains: Sequence[Gain], ahead: Refit | None) -> list[Refi
     if best is not None and best.screened.zones:
         fitted = {r.screened.effect for r in found} | {WINDOWS}  # these are sought anew, not only fitted: `look_again`
         for g in gains:
-            alike = g.effect in CATALOGUE[best.screened.effect].confounders and CATALOGUE[g.effect].zonal
-            if alike and g.effect not in fitted:  # tangents at no strength may miss where it is, or what it does
+            there_too = CATALOGUE[g.effect].alike if best.screened.zones == ALIKE else CATALOGUE[g.effect].zonal
+            confounded = g.effect in CATALOGUE[best.screened.effect].confounders
+            if confounded and there_too and g.effect not in fitted:  # tangents at no strength may miss where it is, or what it does
                 other = work.refit([replace(g, zones=best.screened.zones)], work.accepted)
                 found.extend([] if other is None else [other])
     return sorted(found, key=lambda r: -r.gain)

@@ -70,7 +70,7 @@ class Screening:
             low, high = (problem.residuals_only(model, end + little) for end in (theta, other))
             jacobian = np.column_stack([jacobian, jacobian[:, i] + (high - low) / little[i]])
         self._twins = {len(own) + k: i for k, i in enumerate(twice)}
-        tied = {} if here else _tied(own, [e for e in lacking if CATALOGUE[e].zonal])
+        tied = {} if here else _tied(own, [e for e in lacking if CATALOGUE[e].alike])
         self._tied = range(len(own) + len(twice), len(own) + len(twice) + len(tied))
         jacobian = np.column_stack([jacobian, *(jacobian[:, mine].sum(axis=1) for mine in tied.values())])
         at_the_end = (replace(own[i], name=f"{own[i].name} at the other end") for i in twice)

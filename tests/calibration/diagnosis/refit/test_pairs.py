@@ -214,8 +214,9 @@ def test_a_pair_is_accepted_where_neither_member_would_be() -> None:
     assert both.fit.values[f"sensor_bias@{high}"] == pytest.approx(BIAS, abs=0.1)
 
 
-def test_what_all_zones_have_alike_is_one_strength() -> None:
+def test_what_all_zones_have_alike_is_one_strength(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every valve leaks as much that no meter sees: a strength a zone is too dear, one for all is found and fitted."""
+    monkeypatch.setitem(CATALOGUE, "valve_leak", replace(CATALOGUE["valve_leak"], alike=True))
     clean, leak = quiet_twin(), 4.0
     frame, building = clean.telemetry.frame.copy(), clean.building
     assert isinstance(building.geometry, FloorPlans)
