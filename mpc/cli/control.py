@@ -181,9 +181,8 @@ def compare(
     """
     from calibration.results import check_results_folder
     from mpc.reports.control import (
-        comparison_columns,
-        comparison_rows,
         comparison_summary,
+        comparison_table,
         comparison_verdict,
         write_comparison,
     )
@@ -201,8 +200,8 @@ def compare(
 
     def show() -> None:
         say(comparison_verdict(found))
-        name, *numbers = comparison_columns(found.study.scenario.currency)
-        show_table("Controllers", {name: "", **dict.fromkeys(numbers, "g")}, comparison_rows(found))
+        (name, *numbers), rows = comparison_table(found)
+        show_table("Controllers", {name: "", **dict.fromkeys(numbers, "g")}, rows)
         _show_assumed(found.runs[0])
 
     answer(given.json, comparison_summary(found), show, report)

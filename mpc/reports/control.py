@@ -83,13 +83,13 @@ def write_comparison(comparison: Comparison, out: str | Path, *, command: str = 
     ResultsExistError
         When the folder holds something and ``force`` is not set.
     """
-    runs = comparison.runs
+    runs, (columns, rows) = comparison.runs, comparison_table(comparison)
     content = _content(runs, comparison.of("mpc") or runs[0], command) | {
         "title": f"Controllers of {comparison.study.name} compared",
         "verdict": comparison_verdict(comparison),
         "means": comparison_means(comparison),
-        "columns": comparison_columns(runs[0].kpis.currency),
-        "table": comparison_rows(comparison),
+        "columns": columns,
+        "table": rows,
         "comfortable": all(z.below + z.above < NOTICED for run in runs for z in run.kpis.zones),
         "pictures": [*cost_bars(runs), *side_by_side(runs)],
     }
@@ -244,13 +244,18 @@ def control_verdict(run: ControlRun) -> str:
     k, worst = run.kpis, max(run.kpis.zones, key=lambda z: z.below + z.above)
     powers = (run.loop.record.electricity, run.loop.record.gas)
     electricity, gas = (0.0 if power is None else float(power.sum()) for power in powers)
+    shared = f", of which {percent(electricity / max(electricity + gas, 1e-9))} electricity" if gas else ""
     parts = [
         f"{run.entry.title.capitalize()} spent {money(run.cost, k.currency)} on energy in "
-        f"{duration(3600.0 * k.hours)} ({significant(k.ener_tot)} kWh/m², of which "
-        f"{percent(electricity / max(electricity + gas, 1e-9))} electricity)."
+        f"{duration(3600.0 * k.hours)} ({significant(k.ener_tot)} kWh/m²{shared})."
     ]
     if k.tdis_tot < 1e-3:
         parts.append("No zone left its comfort band.")
+    elif len(k.zones) == 1:
+        parts.append(
+            f"{worst.zone} was outside of its comfort band by {significant(k.tdis_tot, 2)} K h, at most by "
+            f"{significant(max(worst.largest_below, worst.largest_above), 2)} K."
+        )
     else:
         parts.append(
             f"Zones were outside of their comfort band by {significant(k.tdis_tot, 2)} K h on average, the worst, "
@@ -313,6 +318,19 @@ def comparison_verdict(comparison: Comparison) -> str:
             f"zone, that is {percent(way)} of the perfect-forecast savings."
         )
     return " ".join(parts)
+
+
+def comparison_table(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
+    """Heads and rows of the table of controllers, without columns that nothing stands in.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        Of `compare_controllers`.
+    """
+    heads, rows = comparison_columns(comparison.study.scenario.currency), comparison_rows(comparison)
+    kept = [k for k in range(len(heads)) if any(row[k] != spell(None) for row in rows)]
+    return [heads[k] for k in kept], [[row[k] for k in kept] for row in rows]
 
 
 def comparison_columns(currency: str) -> list[str]:
