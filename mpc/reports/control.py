@@ -306,6 +306,9 @@ def comparison_verdict(comparison: Comparison) -> str:
     ]
     if abs(comfort) < 0.01:
         parts.append("Both keep the zones equally comfortable.")
+    elif mpc.kpis.tdis_tot < NOTICED / 10.0:
+        told = f"{significant(best.kpis.tdis_tot, 2)} K h on average"
+        parts.append(f"It kept the zones in their comfort band; with the rule they were outside by {told}.")
     else:
         parts.append(
             f"Its zones were outside of their comfort band by {significant(mpc.kpis.tdis_tot, 2)} K h on average, "

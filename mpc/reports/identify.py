@@ -5,11 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from calibration.results import Content, write_results
+from calibration.results import Content
 from mpc.identify.identify import Identified
 from mpc.identify.maps import EMITTER, OUTDOOR, interval_of
 from mpc.identify.model import FILE, PlantModel
 from mpc.kpi.kpis import Kpis, measure_kpis
+from mpc.reports.display import write_results
 from mpc.reports.figures.identify import course_pictures, error_pictures, map_pictures
 from mpc.reports.means import Means
 from mpc.reports.page import clock, duration, listed, percent, render, significant, spell

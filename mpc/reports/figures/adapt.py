@@ -113,7 +113,7 @@ def for_phone(figure: Figure) -> None:
     height = float(figure.get_size_inches()[1]) * _stack(figure)
     figure.set_size_inches(NARROW, max(min(height, 2.6), 0.9 * height))
     for axes in figure.axes:
-        for axis in (axes.xaxis, axes.yaxis):
+        for axis in (axes.xaxis, axes.yaxis) if axes.get_label() != "<colorbar>" else ():
             locator = axis.get_major_locator()
             if isinstance(locator, AutoDateLocator):
                 locator.minticks = 2

@@ -54,9 +54,9 @@ def course(run: ControlRun) -> list[Picture]:
     right.set_ylim(bottom=0.0)
     _zones(zones, run, x)
     _setpoints(setpoints, run)
+    bought = {"electricity": record.electricity[:n] / _KILO} | ({"gas": _gas(run) / _KILO} if burns else {})
     power.stackplot(
-        x, *[record.electricity[:n] / _KILO, _gas(run) / _KILO][: 1 + burns], labels=["electricity", "gas"][: 1 + burns],
-        colors=[MEASURED, SIMULATED], alpha=0.75, step="pre",
+        x, *bought.values(), labels=list(bought), colors=[MEASURED, SIMULATED], alpha=0.75, step="pre",
     )  # fmt: skip
     power.set(title="What it took", ylabel="power [kW]")
     for one in axes:
@@ -93,7 +93,8 @@ def _zones(axes: Axes, run: ControlRun, x: FloatArray) -> None:
     for ends, alpha, label in spread if len(zones) > 1 else ():
         low, high = np.percentile(zone, ends, axis=1)
         axes.fill_between(x, low, high, color=MUTED, alpha=alpha, linewidth=0, label=label)
-    axes.plot(x, np.median(zone, axis=1), color=style.INK, linewidth=1.2, label="median zone" if len(zones) > 1 else zones[0])
+    middle = "median zone" if len(zones) > 1 else zones[0]
+    axes.plot(x, np.median(zone, axis=1), color=style.INK, linewidth=1.2, label=middle)
     axes.set(title="Zone temperatures", ylabel="[°C]")
 
 
