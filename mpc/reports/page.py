@@ -383,19 +383,7 @@ def estimated_sentences(found: Sequence[Estimated]) -> list[str]:
 _SPELLINGS: dict[str, Callable[..., str]] = {
     f.__name__: f
     for f in (
-        kelvin,
-        signed,
-        watts,
-        significant,
-        plain,
-        unit,
-        duration,
-        clock,
-        counted,
-        percent,
-        sure,
-        ends,
-        in_words,
-        listed,
-    )
+        kelvin, signed, watts, significant, plain, unit, duration, clock,
+        counted, percent, sure, ends, in_words, listed,
+    )  # fmt: skip
 }

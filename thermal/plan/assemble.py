@@ -102,7 +102,7 @@ AREA_TOLERANCE = 0.02
 _CORNERS = sorted(np.ndindex(4, 4), key=lambda at: at[0] % 2 + at[1] % 2 > 0)
 _FIRST = 4  # of them, by which a size is judged
 
-#: A size whose first corners miss the tolerance by more than this factor is left [-]: on drawings of a small pilot, with
+#: A size whose first corners miss the tolerance by more than this factor is left [-]. On a small pilot drawn, with
 #: scales 1 % and 1.7 % beside the true one, the best of all corners was at most 1.2 times as good as that of the first.
 _HOPELESS = 1.5
 
