@@ -385,5 +385,5 @@ _SPELLINGS: dict[str, Callable[..., str]] = {
     for f in (
         kelvin, signed, watts, significant, plain, unit, duration, clock,
         counted, percent, sure, ends, in_words, listed,
-    )  # fmt: skip
-}
+    )
+}  # fmt: skip
