@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from calibration.fleet.case import CaseOutcome
+from calibration.results import Content
 from mpc.reports.diagnosis_words import called
 from mpc.reports.display import write_results
 from mpc.reports.figures.style import MUTED, SIMULATED, Picture, keys_below, panel, picture, styled
@@ -49,7 +50,7 @@ def write_fleet(outcomes: Sequence[CaseOutcome], out: str | Path, what: Kind, ho
     Path
         The page.
     """
-    files = {"fleet.parquet": fleet_table(outcomes), "report.html": render("fleet", _content(outcomes, what, horizon))}
+    files: dict[str, Content] = {"fleet.parquet": fleet_table(outcomes), "report.html": render("fleet", _content(outcomes, what, horizon))}
     return write_results(out, files, force=True) / "report.html"
 
 
@@ -74,9 +75,10 @@ def fleet_table(outcomes: Sequence[CaseOutcome]) -> pd.DataFrame:
         }
         for o in outcomes
     ]  # fmt: skip
-    kinds = {"held_out_mae_before": float, "held_out_mae_after": float, "seconds": float, "has_windows": "boolean"}
+    kinds: dict[Any, Any] = dict.fromkeys(("held_out_mae_before", "held_out_mae_after", "seconds"), float)
+    kinds["has_windows"] = "boolean"
     texts = dict.fromkeys(("case", "status", "verdict", "effects", "error", "message"), "string")
-    table = pd.DataFrame(rows).astype(kinds | texts).set_index("case")
+    table = pd.DataFrame(rows).astype({**kinds, **texts}).set_index("case")
     table.attrs["units"] = {"held_out_mae_before": "K", "held_out_mae_after": "K", "seconds": "s"}
     return table
 
