@@ -50,7 +50,8 @@ def write_fleet(outcomes: Sequence[CaseOutcome], out: str | Path, what: Kind, ho
     Path
         The page.
     """
-    files: dict[str, Content] = {"fleet.parquet": fleet_table(outcomes), "report.html": render("fleet", _content(outcomes, what, horizon))}
+    page = render("fleet", _content(outcomes, what, horizon))
+    files: dict[str, Content] = {"fleet.parquet": fleet_table(outcomes), "report.html": page}
     return write_results(out, files, force=True) / "report.html"
 
 
