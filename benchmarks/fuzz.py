@@ -1,7 +1,8 @@
 """Spoilt inputs of all kinds: whatever comes in, it is taken or refused by a named error of the library.
 
-Six kinds of input: case folders and lists of drawings as YAML, plans and drawings, telemetry as CSV and as Parquet
-(of a case, and from a foreign table), bodies of requests to both servers, and steps of a controller. Each input is a
+Eight kinds of input: case folders and lists of drawings as YAML, plans and drawings, telemetry as CSV and as Parquet
+(of a case, and from a foreign table), requests to the labelling page, to its telemetry, places and jobs, and to the
+server of BOPTEST's API (addresses, heads and bodies), and steps of a controller. Each input is a
 valid one spoilt in a few places (`_fuzz_inputs.py`) by a seed of its own. It may be accepted, or refused by an error of
 the library's families (a status of 400 to 499 with a message, for a server); anything else that is raised, a status of
 500, or a controller without finite setpoints is a fault, and is listed with its seed.
@@ -28,8 +29,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import yaml
+from _fuzz_controller import Controlled
 from _fuzz_inputs import spoil_bytes, spoil_frame, spoil_plan, spoil_tree
-from _fuzz_targets import Controlled, Served
+from _fuzz_servers import Page, Plant, TelemetryPage
 from _table import markdown, write
 
 from thermal.case.load import load_building, load_case
@@ -141,10 +143,24 @@ def fuzz_plans(rng: np.random.Generator, folder: Path) -> None:
     read_floor(read_drawing_list(folder / "list.yaml").floors[0], folder)
 
 
+def spoilt_table(name: str, rng: np.random.Generator) -> bytes:
+    """Telemetry as CSV or Parquet, by the ending of its name, spoilt as a table, as bytes, or both."""
+    if name.endswith(".csv"):
+        text = spoil_frame(telemetry(), rng).to_csv() if rng.random() < 0.5 else telemetry().to_csv()
+        return spoil_bytes(text.encode("utf-8", "replace"), rng)
+    stream = io.BytesIO()
+    try:
+        frame = spoil_frame(telemetry(), rng)
+        (frame if rng.random() < 0.7 else frame.reset_index()).to_parquet(stream)
+    except Exception:  # it cannot be written as Parquet: another one
+        stream = io.BytesIO()
+        telemetry().to_parquet(stream)
+    return stream.getvalue() if rng.random() < 0.7 else spoil_bytes(stream.getvalue(), rng)
+
+
 def fuzz_csv(rng: np.random.Generator, folder: Path) -> None:
     """Telemetry of a case as CSV, and foreign tables."""
-    text = spoil_frame(telemetry(), rng).to_csv() if rng.random() < 0.5 else telemetry().to_csv()
-    table = spoil_bytes(text.encode("utf-8", "replace"), rng)
+    table = spoilt_table("export.csv", rng)
     if rng.random() < 0.7:
         _look(write_case(folder, None, None, table))
     else:
@@ -153,14 +169,7 @@ def fuzz_csv(rng: np.random.Generator, folder: Path) -> None:
 
 def fuzz_parquet(rng: np.random.Generator, folder: Path) -> None:
     """Telemetry of a case as Parquet, and foreign tables."""
-    stream = io.BytesIO()
-    try:
-        frame = spoil_frame(telemetry(), rng)
-        (frame if rng.random() < 0.7 else frame.reset_index()).to_parquet(stream)
-    except Exception:  # it cannot be written as Parquet: another one
-        stream = io.BytesIO()
-        telemetry().to_parquet(stream)
-    table = stream.getvalue() if rng.random() < 0.7 else spoil_bytes(stream.getvalue(), rng)
+    table = spoilt_table("export.parquet", rng)
     if rng.random() < 0.7:
         write_case(folder, PLANS | {"telemetry": "telemetry.parquet"})
         (folder / "telemetry.parquet").write_bytes(table)
@@ -191,18 +200,21 @@ class Outcome:
 def fuzzers() -> Iterator[dict[str, Fuzzer]]:
     """All kinds of input, ready to be asked; names as in the table."""
     with ExitStack() as stack:
-        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        served = Served(write_case(folder), drawings()["codes.csv"])
-        stack.callback(served.close)
-        stack.enter_context(served.page)
-        stack.enter_context(served.plant)
-        controlled = Controlled()
+        folders = [Path(stack.enter_context(tempfile.TemporaryDirectory())) for _ in range(2)]
+        page = Page(write_case(folders[0]), drawings()["codes.csv"])
+        measured, plant, controlled = TelemetryPage(write_case(folders[1]), spoilt_table), Plant(), Controlled()
+        for served in (page, measured):
+            stack.callback(served.close)
+        for client in (page.client, measured.client, plant.client):
+            stack.enter_context(client)
         yield {
             "YAML of cases and lists of drawings": fuzz_yaml,
             "plans and drawings": fuzz_plans,
             "telemetry as CSV": fuzz_csv,
             "telemetry as Parquet": fuzz_parquet,
-            "requests to the servers": lambda rng, folder: served.ask(rng),
+            "requests to the labelling page": lambda rng, folder: page.ask(rng),
+            "its telemetry, files and jobs": lambda rng, folder: measured.ask(rng),
+            "requests to BOPTEST's API": lambda rng, folder: plant.ask(rng),
             "steps of a controller": lambda rng, folder: controlled.step(rng),
         }
 

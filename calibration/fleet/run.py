@@ -25,6 +25,9 @@ from thermal.case.load import NAME
 #: File in the folder of results with an entry a case.
 SUMMARY = "summary.json"
 
+#: Files of all cases together, which a run with pages adds beside it.
+_TOGETHER = (SUMMARY, "fleet.parquet", "fleet.csv", "fleet.xlsx", "report.html")
+
 #: Folder beside the results that a run keeps while it lasts.
 RUNNING = ".running"
 
@@ -175,7 +178,7 @@ def _check_cases(cases: Sequence[str | Path], out: Path) -> list[Path]:
                 f"cases: expected each name once, got {both}; both would write to {out / name}: rename one, or "
                 "calibrate them into different folders"
             )
-        if not name or name.startswith(".") or name == SUMMARY:
+        if not name or name.startswith(".") or name in _TOGETHER:
             raise CalibrationError(f"cases: expected folders whose names results can take, got {name!r}; rename it")
     real = out.resolve()
     for path in paths:
@@ -189,10 +192,15 @@ def _absolute(path: str | Path) -> Path:
     return Path(os.path.abspath(path))
 
 
+def _is_of_all(path: Path) -> bool:
+    """Whether a file is of all cases together: their summary, table, page or a figure of it."""
+    return path.name in _TOGETHER or (path.name.startswith("figure_") and path.suffix in (".svg", ".png"))
+
+
 def _refuse_other_contents(out: Path) -> None:
     """Refuse a folder that holds anything but results of such a run; hidden files are nobody's results."""
     held = sorted(path for path in out.iterdir() if not path.name.startswith(".")) if out.is_dir() else []
-    other = [path.name for path in held if path.name != SUMMARY and not (path / RECORD).is_file()]
+    other = [path.name for path in held if not _is_of_all(path) and not (path / RECORD).is_file()]
     if other:
         shown = ", ".join(other[:4]) + (f" and {len(other) - 4} more" if len(other) > 4 else "")
         raise ResultsExistError(

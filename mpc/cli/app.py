@@ -114,7 +114,7 @@ def _report(error: Exception, command: str, json: bool) -> int:
     return code
 
 
-_REPORTING = (demo, check, simulate, evaluate, calibrate, diagnose, experiment, monitor, control, compare)
+_REPORTING = (demo, check, simulate, evaluate, calibrate, diagnose, experiment, monitor, identify, control, compare)
 
 for _command in (
     *(demo, doctor, check, import_plan, import_devices, import_telemetry, label),

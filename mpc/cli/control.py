@@ -180,13 +180,8 @@ def compare(
     --end 2023-10-18 --out compared
     """
     from calibration.results import check_results_folder
-    from mpc.reports.control import (
-        comparison_columns,
-        comparison_rows,
-        comparison_summary,
-        comparison_verdict,
-        write_comparison,
-    )
+    from mpc.reports.comparison import comparison_table
+    from mpc.reports.control import comparison_summary, comparison_verdict, write_comparison
     from mpc.studies.registry import find_controller
     from mpc.studies.run import compare_controllers
 
@@ -201,8 +196,8 @@ def compare(
 
     def show() -> None:
         say(comparison_verdict(found))
-        name, *numbers = comparison_columns(found.study.scenario.currency)
-        show_table("Controllers", {name: "", **dict.fromkeys(numbers, "g")}, comparison_rows(found))
+        (name, *numbers), rows = comparison_table(found)
+        show_table("Controllers", {name: "", **dict.fromkeys(numbers, "g")}, rows)
         _show_assumed(found.runs[0])
 
     answer(given.json, comparison_summary(found), show, report)
@@ -258,7 +253,7 @@ def demo(out: Annotated[Path, folder("the results")] = OUT, force: Force = False
 
 def _show_demo(found: Demo, out: Path) -> None:
     """Write what came of the error and of the costs to stdout."""
-    from mpc.reports.control import comparison_rows
+    from mpc.reports.comparison import comparison_rows
 
     content = found.to_dict()
     names = {"uncalibrated": "as it was drawn", "calibrated": "calibrated", "with_effects": "with what was found"}

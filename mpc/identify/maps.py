@@ -230,8 +230,10 @@ def regress(loads: Loads, values: FloatArray, machines: Sequence[int]) -> tuple[
     )  # fmt: skip
     design = np.column_stack(columns)
     found = OLS(values[rows], design).fit(cov_type="HAC", cov_kwds={"maxlags": _LAGS})
+    with np.errstate(invalid="ignore"):  # of a feature that says next to nothing the variance may round below zero
+        deviations = np.asarray(found.bse)
     parts = [
-        {name: (float(found.params[k]), float(found.bse[k])) for k, (owner, name) in enumerate(owners) if owner == m}
+        {name: (float(found.params[k]), float(deviations[k])) for k, (owner, name) in enumerate(owners) if owner == m}
         for m in machines
     ]
     curves = [Curve({n: c for n, (c, _) in p.items()}, {n: d for n, (_, d) in p.items()}) for p in parts]

@@ -45,7 +45,8 @@ def _prices(study: Study | SeenStudy) -> list[tuple[str, str]]:
     scenario, n = study.scenario, study.steps
     both = (scenario.electricity_price, scenario.gas_price)
     electricity, gas = (listed_prices(of[:n], scenario.currency) for of in both)
-    return [("electricity price", f"{electricity} per kWh"), ("gas price", f"{gas} per kWh of upper heating value")]
+    burnt = [("gas price", f"{gas} per kWh of upper heating value")] if np.any(scenario.gas_price[:n]) else []
+    return [("electricity price", f"{electricity} per kWh"), *burnt]
 
 
 def _discomfort(study: Study | SeenStudy) -> tuple[str, str]:

@@ -27,7 +27,7 @@ from mpc.reports.page import (
     render,
 )
 from mpc.reports.residuals import diagnostics_content
-from mpc.reports.warnings import case_warnings
+from mpc.reports.warnings import case_warnings, windows_first
 from thermal.case.case import Case
 from thermal.model.case_replay import Inputs, replay_inputs
 from thermal.model.matrices import SymbolicModel
@@ -175,9 +175,8 @@ def _change(before: float, after: float) -> str:
 def _parameter_sentence(parameters: Sequence[ParameterEstimate]) -> str:
     estimated = [p for p in parameters if p.standard_error is not None]
     told = sum(p.identifiable for p in estimated)
-    absent = [p for p in estimated if p.at_bound and p.base == "solar_aperture" and p.value < p.start]
-    whole = [p for p in estimated if p.at_bound and p.base == "floor_heat_share"]
-    bound = [in_words(p.name) for p in estimated if p.at_bound and p not in (*absent, *whole)]
+    absent, whole = _absent(estimated), [p for p in estimated if p.at_bound and p.base == "floor_heat_share"]
+    bound = [in_words(p.name) for p in _leaving(estimated)]
     free = len(estimated) - told - len(bound) - len(absent) - len(whole)
     begin = f"Of {counted(len(estimated), 'estimated parameter')} the data determine {told or 'none'} by "
     parts = [begin + ("itself" if told == 1 else "themselves")]
@@ -193,6 +192,17 @@ def _parameter_sentence(parameters: Sequence[ParameterEstimate]) -> str:
     names = f" ({', '.join(bound)})" if len(bound) < 4 else ""
     lie = "lies" if len(bound) == 1 else "lie"
     return "; ".join([*parts, f"{len(bound)} {lie} on a bound{names}, which hints at physics that the model lacks."])
+
+
+def _absent(parameters: Sequence[ParameterEstimate]) -> list[ParameterEstimate]:
+    """Solar apertures of no size, which are no wrong ones."""
+    return [p for p in parameters if p.at_bound and p.base == "solar_aperture" and p.value < p.start]
+
+
+def _leaving(parameters: Sequence[ParameterEstimate]) -> list[ParameterEstimate]:
+    """Estimates on a bound that hint at physics which the model lacks."""
+    absent = {p.name for p in _absent(parameters)}
+    return [p for p in parameters if p.at_bound and p.name not in absent and p.base != "floor_heat_share"]
 
 
 def _kinds(rows: Sequence[Mapping[str, Any]]) -> dict[str, list[Mapping[str, Any]]]:
@@ -226,7 +236,7 @@ def _content(result: CalibrationResult, case: Case, grid: SymbolicModel, inputs:
         "after": after,
         "subtitle": evaluation.subtitle(case, after),
         "verdict": calibration_verdict(result),
-        "means": calibration_means(result, evaluation.unchanged_error(after)),
+        "means": windows_first(calibration_means(result, evaluation.unchanged_error(after)), case),
         "determined": determined_words([p for p in result.parameters if p.standard_error is not None]),
         "warnings": case_warnings(case),
         "fine": result.solver.success and after.metrics.mae < before.metrics.mae,
@@ -237,7 +247,8 @@ def _content(result: CalibrationResult, case: Case, grid: SymbolicModel, inputs:
         "kinds": list(_kinds(rows).items()),
         "drawn": MOST_ROWS,
         "parameter_figure": parameter_ranges(result.parameters),
-        "told": information_sentences(result.information),
+        "told": information_sentences(result.information)[1:],  # how many, says `determined`
+        "leaving": len(_leaving(result.parameters)),
         "zones": evaluation.by_error(after.by_zone()),
         "intervals": [record | {"part": title} for title, k in reversed(parts.items())
                       for record in evaluation.interval_records(result.calibrated[k])],

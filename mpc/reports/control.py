@@ -12,10 +12,11 @@ import pandas as pd
 
 from mpc.kpi.kpis import Kpis
 from mpc.reports.assumptions import assumption_rows
+from mpc.reports.comparison import comparison_table
 from mpc.reports.figures.control import cost_bars, course, expectations, side_by_side
 from mpc.reports.figures.style import CELSIUS
 from mpc.reports.means import NOTICED, comparison_means, control_means
-from mpc.reports.page import duration, percent, significant, spell, write_report
+from mpc.reports.page import duration, percent, significant, write_report
 from mpc.studies.described import RecordedPlant
 from mpc.studies.run import Comparison, ControlRun, prediction_errors
 from thermal.case.points import POINT_TYPES, split_column
@@ -83,13 +84,13 @@ def write_comparison(comparison: Comparison, out: str | Path, *, command: str = 
     ResultsExistError
         When the folder holds something and ``force`` is not set.
     """
-    runs = comparison.runs
+    runs, (columns, rows) = comparison.runs, comparison_table(comparison)
     content = _content(runs, comparison.of("mpc") or runs[0], command) | {
         "title": f"Controllers of {comparison.study.name} compared",
         "verdict": comparison_verdict(comparison),
         "means": comparison_means(comparison),
-        "columns": comparison_columns(runs[0].kpis.currency),
-        "table": comparison_rows(comparison),
+        "columns": columns,
+        "table": rows,
         "comfortable": all(z.below + z.above < NOTICED for run in runs for z in run.kpis.zones),
         "pictures": [*cost_bars(runs), *side_by_side(runs)],
     }
@@ -244,13 +245,18 @@ def control_verdict(run: ControlRun) -> str:
     k, worst = run.kpis, max(run.kpis.zones, key=lambda z: z.below + z.above)
     powers = (run.loop.record.electricity, run.loop.record.gas)
     electricity, gas = (0.0 if power is None else float(power.sum()) for power in powers)
+    shared = f", of which {percent(electricity / max(electricity + gas, 1e-9))} electricity" if gas else ""
     parts = [
         f"{run.entry.title.capitalize()} spent {money(run.cost, k.currency)} on energy in "
-        f"{duration(3600.0 * k.hours)} ({significant(k.ener_tot)} kWh/m², of which "
-        f"{percent(electricity / max(electricity + gas, 1e-9))} electricity)."
+        f"{duration(3600.0 * k.hours)} ({significant(k.ener_tot)} kWh/m²{shared})."
     ]
     if k.tdis_tot < 1e-3:
         parts.append("No zone left its comfort band.")
+    elif len(k.zones) == 1:
+        parts.append(
+            f"{worst.zone} was outside of its comfort band by {significant(k.tdis_tot, 2)} K h, at most by "
+            f"{significant(max(worst.largest_below, worst.largest_above), 2)} K."
+        )
     else:
         parts.append(
             f"Zones were outside of their comfort band by {significant(k.tdis_tot, 2)} K h on average, the worst, "
@@ -301,6 +307,9 @@ def comparison_verdict(comparison: Comparison) -> str:
     ]
     if abs(comfort) < 0.01:
         parts.append("Both keep the zones equally comfortable.")
+    elif mpc.kpis.tdis_tot < NOTICED / 10.0:
+        told = f"{significant(best.kpis.tdis_tot, 2)} K h on average"
+        parts.append(f"It kept the zones in their comfort band; with the rule they were outside by {told}.")
     else:
         parts.append(
             f"Its zones were outside of their comfort band by {significant(mpc.kpis.tdis_tot, 2)} K h on average, "
@@ -313,44 +322,6 @@ def comparison_verdict(comparison: Comparison) -> str:
             f"zone, that is {percent(way)} of the perfect-forecast savings."
         )
     return " ".join(parts)
-
-
-def comparison_columns(currency: str) -> list[str]:
-    """Heads of the table of controllers.
-
-    Parameters
-    ----------
-    currency : str
-        Of costs.
-    """
-    return [
-        "controller", f"energy cost [{currency}]", f"energy cost and price of discomfort [{currency}]",
-        "saved against the best rule, discomfort counted", "discomfort, mean zone [K h]",
-        "discomfort, worst zone [K h]", "energy [kWh/m²]", "highest quarter of an hour of electricity [W/m²]",
-        "emissions of CO₂ [g/m²]", "share of the perfect-forecast savings",
-    ]  # fmt: skip
-
-
-def comparison_rows(comparison: Comparison) -> list[list[str]]:
-    """Rows of the table of controllers, from cost to the share of the perfect-forecast savings.
-
-    Parameters
-    ----------
-    comparison : Comparison
-        Of `compare_controllers`.
-    """
-    rows = []
-    for run in comparison.runs:
-        k, best = run.kpis, run is comparison.best_rule
-        worst = max(z.below + z.above for z in k.zones)
-        way = comparison.way_to_bound(run) if run.controller in ("mpc", "bound") else None
-        values = (
-            (run.cost, ",.2f"), (run.objective, ",.2f"), (None if best else comparison.saving(run), "percent"),
-            (k.tdis_tot, ".3f"), (worst, ".2f"), (k.ener_tot, ".3f"), (1e3 * (k.pele_tot or 0.0), ".1f"),
-            (None if k.emis_tot is None else 1e3 * k.emis_tot, ".1f"), (way, "percent"),
-        )  # fmt: skip
-        rows.append([run.entry.title, *(spell(value, how) for value, how in values)])
-    return rows
 
 
 class _Reason(NamedTuple):

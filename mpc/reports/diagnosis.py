@@ -24,7 +24,7 @@ from mpc.reports.figures.plan import heat_maps
 from mpc.reports.figures.style import CELSIUS, Picture
 from mpc.reports.means_found import diagnosis_means
 from mpc.reports.page import kelvin, listed, render, significant, sure, unit
-from mpc.reports.warnings import case_warnings
+from mpc.reports.warnings import case_warnings, windows_first
 from thermal.case.building import FloorPlans
 from thermal.case.case import Case
 from thermal.effects.catalogue import CATALOGUE
@@ -161,7 +161,7 @@ def _content(result: Diagnosis, case: Case, replayed: Sequence[Replay]) -> dict[
         "result": result,
         "subtitle": subtitle(case, evaluations[0]),
         "verdict": diagnosis_words.diagnosis_verdict(result),
-        "means": diagnosis_means(result),
+        "means": windows_first(diagnosis_means(result), case),
         "warnings": case_warnings(case),
         "fine": result.verdict.name != "unexplained",
         "found": found,

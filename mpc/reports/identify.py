@@ -5,20 +5,21 @@ from typing import Any
 
 import numpy as np
 
-from calibration.results import Content, write_results
+from calibration.results import Content
 from mpc.identify.identify import Identified
 from mpc.identify.maps import EMITTER, OUTDOOR, interval_of
 from mpc.identify.model import FILE, PlantModel
 from mpc.kpi.kpis import Kpis, measure_kpis
+from mpc.reports.display import write_results
 from mpc.reports.figures.identify import course_pictures, error_pictures, map_pictures
 from mpc.reports.means import Means
-from mpc.reports.page import clock, duration, listed, percent, render, significant
+from mpc.reports.page import clock, duration, listed, percent, render, significant, spell
 from mpc.studies.described import Experiment
 
 #: What terms of a map are called.
 _TERMS = {
-    "standing": "at any speed above zero", "command": "at full load", "command^2": "square of the load",
-    "outdoor": "a 10 K warmer outdoor air", "emitter": "a 10 K warmer floor",
+    "standing": "at any speed above zero", "command": "times the load", "command^2": "times the load squared",
+    "outdoor": "times the load, outdoor air 10 K warmer", "emitter": "times the load, floor 10 K warmer",
 }  # fmt: skip
 _OPERATION = {
     "duty": "run at full load or not at all",
@@ -153,9 +154,10 @@ def identify_means(found: Identified) -> Means:
         last = found.errors[-1]
         simple = min(last.persistence, last.arx)
         trust = f"On days that it has not seen it is {last.grey_box:.2f} degrees C off {duration(last.lead)} ahead; "
-        trust += "simple models do no better." if last.grey_box < simple else "a simple model does better."
-    return Means(answer, trust, "Control the plant with it: buildingmpc control plant.yaml --model, and beside its own "
-                 "control: buildingmpc compare.")  # fmt: skip
+        trust += f"the best simple forecast is {simple:.2f} off"
+        trust += "." if last.grey_box < simple else ": better, so give it more days before you rely on it."
+    then = "See what it saves against the plant's own control, with DIR the folder of this page: buildingmpc compare "
+    return Means(answer, trust, f"{then}PLANT.yaml --model DIR --out compared.")
 
 
 def identify_rows(found: Identified) -> list[tuple[str, float, float, float]]:
@@ -177,8 +179,11 @@ def map_rows(model: PlantModel) -> list[list[str]]:
     model : PlantModel
         Identified.
     """
-    return [[name, what, term, f"{value:,.0f} W", f"{low:,.0f} to {high:,.0f} W"]
-            for m in model.maps for name, what, term, value, (low, high) in _terms(m)]  # fmt: skip
+    return [
+        [name, what, term, f"{spell(value, ',.0f')} W", f"{spell(low, ',.0f')} to {spell(high, ',.0f')} W"]
+        for m in model.maps
+        for name, what, term, value, (low, high) in _terms(m)
+    ]
 
 
 def _terms(m: Any) -> list[tuple[str, str, str, float, tuple[float, float]]]:
@@ -215,7 +220,7 @@ def _content(found: Identified, made: Experiment | None, command: str) -> dict[s
         "title": f"Model of {found.model.name}", "means": identify_means(found), "cards": cards,
         "verdict": identify_verdict(found, made),
         "subtitle": f"{clock(index[0])} to {clock(index[-1])}, held out from {clock(index[found.split])} on",
-        "errors": [[duration(e.lead), f"{e.grey_box:.3f}", f"{e.bias:+.3f}".replace("-", "−"), f"{e.arx:.3f}",
+        "errors": [[duration(e.lead), f"{e.grey_box:.3f}", spell(e.bias, "+.3f"), f"{e.arx:.3f}",
                     f"{e.persistence:.3f}", str(e.count)] for e in found.errors],
         "machines": machines, "maps": map_rows(found.model), "zones": zones, "notes": found.notes, "command": command,
         "slowest": significant(float(np.max(box.time_constants)) / 3600.0, 3),

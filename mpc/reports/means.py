@@ -200,9 +200,9 @@ def comparison_means(comparison: Comparison) -> Means:
     saved = 1.0 - mpc.cost / best.cost if best.cost > 0.0 else 0.0
     answer = f"Control that looks ahead spends {percent(abs(saved))} {'less' if saved >= 0 else 'more'} on energy than "
     answer += f"the best fixed rules ({mpc.cost:,.2f} against {best.cost:,.2f} {mpc.kpis.currency}). "
-    answer += f"With it: {comfort_words(mpc)}"
+    answer += comfort_words(mpc)
     if comfort_words(best) != comfort_words(mpc):
-        answer += f" With the rules: {comfort_words(best)}"
+        answer += f" With the rules, by contrast: {comfort_words(best)}"
         counted = comparison.saving(mpc)
         if counted is not None:
             answer += f" Counting discomfort, it is {percent(abs(counted))} {'better' if counted >= 0 else 'worse'}."
@@ -231,11 +231,11 @@ def comfort_words(run: ControlRun) -> str:
         Of a study.
     """
     worst = max(run.kpis.zones, key=lambda z: z.below + z.above)
-    size = max(worst.largest_below, worst.largest_above)
     if worst.below + worst.above < NOTICED:
         return "No room was noticeably too cold or too warm."
     outside = [z.zone for z in run.kpis.zones if z.below + z.above >= NOTICED]
     rooms = listed(outside) if len(outside) <= 3 else f"{len(outside)} of {len(run.kpis.zones)} rooms"
-    how = "cold" if worst.below >= worst.above else "warm"
-    text = f"{rooms} left the comfort band; the worst, {worst.zone}, was too {how} by up to "
-    return f"{text}{significant(size, 2)} degrees C."
+    cold = worst.below >= worst.above
+    which = "it" if len(outside) == 1 else f"the worst, {worst.zone},"
+    size = significant(worst.largest_below if cold else worst.largest_above, 2)
+    return f"{rooms} left the comfort band; {which} was too {'cold' if cold else 'warm'} by up to {size} degrees C."

@@ -35,7 +35,7 @@ def write_monitoring(found: Monitoring, out: str | Path, *, force: bool = False)
     """
     content = {
         "case": found.case, "verdict": monitoring_verdict(found), "means": monitoring_means(found),
-        "events": event_rows(found),
+        "events": event_rows(found), "horizon": found.settings.horizon,
         "figures": time_line(found), "span": (found.days.dates[0], found.days.dates[-1]),
         "reference": found.settings.reference_days, "threshold": found.course.threshold,
         "withdrawn": [f"{found.date(day):%Y-%m-%d}" for day in found.course.withdrawn],

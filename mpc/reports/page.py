@@ -17,6 +17,7 @@ from jinja2.filters import make_attrgetter
 from mpc.reports.display import display, write_results
 from mpc.reports.figures.zoom import zoom_scripts
 from mpc.reports.glossary import words_on
+from mpc.reports.opening import opening
 from thermal.case.estimated import Estimated, estimate_summary
 from thermal.parameters import FACADE_PREFIX
 
@@ -41,7 +42,7 @@ def _environment() -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {**_SPELLINGS, "spell": spell, "cells": _cells}
+    environment.filters |= {**_SPELLINGS, "spell": spell, "cells": _cells, "opening": opening}
     return environment
 
 
@@ -382,19 +383,7 @@ def estimated_sentences(found: Sequence[Estimated]) -> list[str]:
 _SPELLINGS: dict[str, Callable[..., str]] = {
     f.__name__: f
     for f in (
-        kelvin,
-        signed,
-        watts,
-        significant,
-        plain,
-        unit,
-        duration,
-        clock,
-        counted,
-        percent,
-        sure,
-        ends,
-        in_words,
-        listed,
+        kelvin, signed, watts, significant, plain, unit, duration, clock,
+        counted, percent, sure, ends, in_words, listed,
     )
-}
+}  # fmt: skip

@@ -18,7 +18,8 @@ pytest.importorskip("httpx", reason="needs httpx, which the test extra has")
 def fuzz(script: Callable[[str], ModuleType]) -> ModuleType:
     script("_table")
     script("_fuzz_inputs")
-    script("_fuzz_targets")
+    script("_fuzz_servers")
+    script("_fuzz_controller")
     return script("fuzz")
 
 

@@ -76,6 +76,7 @@ async function telemetry() {
 async function reports() {
   await page.click("#telemetry-calibrate");
   await page.waitForSelector("#job-calibrate:has-text('fitting')");
+  await page.waitForSelector("#job-calibrate:has-text('left')");
   await picture("running");
   await page.reload();
   await page.waitForSelector(".zone");

@@ -121,7 +121,7 @@ def test_a_run_that_is_killed_or_interrupted_goes_on(cases: Path, tmp_path: Path
     assert entries == json.loads((out / "summary.json").read_text(encoding="utf-8"))["cases"]
     assert [name for name, entry in entries.items() if entry["resumed"]] == kept[:-1]
     assert {entry["status"] for entry in entries.values()} == {"calibrated"}
-    assert sorted(p.name for p in out.iterdir()) == [*NAMES, "summary.json"]
+    assert sorted(p.name for p in out.iterdir()) == ["fleet.parquet", *NAMES, "report.html", "summary.json"]
 
     answer = run("calibrate", cases, "--out", out, *OPTIONS)
     assert answer.exit_code == 0

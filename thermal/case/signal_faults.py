@@ -196,16 +196,15 @@ def spikes(values: FloatArray, step: float) -> list[Stretch]:
     slope = (SPIKE_SIZE_HOURLY - SPIKE_SIZE) / 3000.0
     size = max(SPIKE_SIZE + slope * max(step - 600.0, 0.0), SPIKE_DEVIATIONS * scatter)
     widest = max(1, min(SPIKE_SAMPLES, int(SPIKE_SECONDS // step)))
-    found = []
-    position = 1
+    found, behind = [], 0
     with np.errstate(invalid="ignore"):
-        candidates = set((np.flatnonzero(np.abs(differences) > size) + 1).tolist())
-    while position < len(values) - 1:
-        width = _spike_width(values, position, widest, size) if position in candidates else 0
+        candidates = np.flatnonzero(np.abs(differences) > size) + 1
+    for position in candidates.tolist():
+        width = _spike_width(values, position, widest, size) if position >= behind else 0
         if width:
             jump = values[position] - values[position - 1]
             found.append((position, position + width - 1, f"{jump:+.1f} K and back"))
-        position += max(width, 1)
+            behind = position + width
     return found
 
 

@@ -97,7 +97,17 @@ CELL_SIZES = (0.5, 0.4, 0.25, 0.2, 0.1, 0.05)
 
 #: Error of a zone's area that is let be [-].
 AREA_TOLERANCE = 0.02
-_PHASES = 4  # corners of the grid that are tried, a side
+
+#: Corners of the grid that are tried, in quarters of a cell: the halves first.
+_CORNERS = sorted(np.ndindex(4, 4), key=lambda at: at[0] % 2 + at[1] % 2 > 0)
+_FIRST = 4  # of them, by which a size is judged
+
+#: A size whose first corners miss the tolerance by more than this factor is left [-]. On a small pilot drawn, with
+#: scales 1 % and 1.7 % beside the true one, the best of all corners was at most 1.2 times as good as that of the first.
+_HOPELESS = 1.5
+
+#: Of cells as fine as this the first corners are enough, where they meet the tolerance [m]: the others are 25 mm away.
+_FINE = 0.1
 _MOST_CELLS = 4_000_000  # of all floors together
 
 Progress = Callable[[str, int, int], None]
@@ -184,7 +194,9 @@ def assemble_plans(
 
     Notes
     -----
-    The grid's corner is chosen too, among 16, for the smallest largest error.
+    The grid's corner is chosen too, among 16, for the smallest largest error. Where the size is chosen, four of them
+    tell whether the other twelve are tried: not of a size that misses by half as much again, nor of cells of 0.1 m
+    that fit.
     """
     named = distinct_names(floors)
     _check_names(named)
@@ -201,14 +213,20 @@ def assemble_plans(
                 break
             found = f"{size:g} m, which makes {cells / 1e6:.0f} million"
             raise PlanError("cell_size", f"at most {_MOST_CELLS / 1e6:.0f} million cells", found)
-        for phase in np.ndindex(_PHASES, _PHASES):
+        least = np.inf  # of this size
+        for tried, phase in enumerate(_CORNERS):
+            if cell_size is None and tried == _FIRST:
+                enough = size <= _FINE and least <= AREA_TOLERANCE
+                if enough or least > _HOPELESS * AREA_TOLERANCE:
+                    break
             try:
-                drawn, corner = draw_cells(placed, size, (phase[0] / _PHASES, phase[1] / _PHASES))
+                drawn, corner = draw_cells(placed, size, (phase[0] / 4, phase[1] / 4))
             except LostRoomError as error:
                 lost = error
                 break
             errors = _area_errors(placed, drawn, size)
             worst = max(map(abs, errors.values()))
+            least = min(least, worst)
             if best is None or worst < best[0]:
                 best = (worst, PlanImport(FloorPlans(size, drawn), placed, errors, corner))
         if best is not None and best[0] <= AREA_TOLERANCE:

@@ -61,8 +61,9 @@ def _fill_narrow(ink: BoolArray, pixel: float, width: float) -> BoolArray:
     """
     framed = np.pad(ink, 1)
     spaces, count = ndimage.label(~framed)
-    depth = ndimage.maximum(ndimage.distance_transform_edt(~framed), spaces, np.arange(count + 1))
-    narrow = 2.0 * np.asarray(depth) * pixel <= width + 2.0 * pixel
+    depth = np.zeros(count + 1)
+    np.maximum.at(depth, spaces.ravel(), ndimage.distance_transform_edt(~framed).ravel())  # no sort
+    narrow = 2.0 * depth * pixel <= width + 2.0 * pixel
     narrow[[0, spaces[0, 0]]] = False
     filled: BoolArray = framed | narrow[spaces]
     return filled[1:-1, 1:-1]

@@ -284,7 +284,8 @@ def _label(basins: Basins, pixel: float, settings: PlanSettings) -> tuple[Int32A
     pieces = basins.pieces
     count = int(pieces.max())
     area = np.bincount(pieces.ravel(), minlength=count + 1) * pixel**2
-    depth = np.asarray(ndimage.maximum(ndimage.distance_transform_edt(pieces > 0), pieces, np.arange(count + 1)))
+    depth = np.zeros(count + 1)
+    np.maximum.at(depth, pieces.ravel(), ndimage.distance_transform_edt(pieces > 0).ravel())  # no sort
     is_room = (area >= settings.smallest_room) & (2.0 * depth * pixel > settings.thickest_wall)
     is_room[[0, basins.outside]] = False
     small = int(np.count_nonzero(area[1:] > 0.0) - np.count_nonzero(is_room[1:]) - 1)

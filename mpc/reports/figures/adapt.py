@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.dates import AutoDateLocator
 from matplotlib.figure import Figure
+from matplotlib.gridspec import GridSpec
 from matplotlib.legend import Legend
 from matplotlib.text import Text
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, ScalarFormatter
@@ -38,6 +39,9 @@ DARK = {
 
 #: Decimals of coordinates beyond a hundredth of a point, which no screen shows: a third of a page.
 _LONG = re.compile(r"(?<=[ LMCQ\"-])(\d+\.\d\d)\d+(?=[ \n\"LMCQ])")
+
+#: How high a figure on a phone is against one of its axes before, for each of those below each other [-].
+_LOWER = 0.75
 
 _UNIT = re.compile(r"\[([^\]]+)\]")
 
@@ -106,10 +110,10 @@ def for_phone(figure: Figure) -> None:
     figure : Figure
         That is not needed wide any more.
     """
-    height = float(figure.get_size_inches()[1])
+    height = float(figure.get_size_inches()[1]) * _stack(figure)
     figure.set_size_inches(NARROW, max(min(height, 2.6), 0.9 * height))
     for axes in figure.axes:
-        for axis in (axes.xaxis, axes.yaxis):
+        for axis in (axes.xaxis, axes.yaxis) if axes.get_label() != "<colorbar>" else ():
             locator = axis.get_major_locator()
             if isinstance(locator, AutoDateLocator):
                 locator.minticks = 2
@@ -139,6 +143,18 @@ def for_phone(figure: Figure) -> None:
         handles = [handle for handle in legend.legend_handles if handle is not None]
         figure.legend(handles, names, loc="outside lower center", ncols=_columns(names), fontsize=8,
                       columnspacing=1.0, handlelength=1.4)  # fmt: skip
+
+
+def _stack(figure: Figure) -> float:
+    """Put axes that stand beside each other in one row below each other; gives how much higher the figure becomes."""
+    row = [axes for axes in figure.axes if (place := axes.get_subplotspec()) and place.get_gridspec().nrows == 1]
+    if len(row) < 2:
+        return 1.0
+    below = GridSpec(len(row), 1, figure=figure)
+    for k, axes in enumerate(row):
+        axes.set_subplotspec(below[k])
+        axes.tick_params(labelleft=True)
+    return _LOWER * len(row)
 
 
 def _is_beside(legend: Legend, axes: Axes) -> bool:

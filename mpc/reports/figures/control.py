@@ -42,7 +42,9 @@ def course(run: ControlRun) -> list[Picture]:
     )
     x = style.lines_over_time(power, run.study.stamps, ticks=9)
     prices.step(x, scenario.electricity_price[:n], where="pre", color=MEASURED, label="electricity")
-    prices.step(x, scenario.gas_price[:n], where="pre", color=SIMULATED, label="gas")
+    burns = bool(np.any(_gas(run)))
+    if burns:
+        prices.step(x, scenario.gas_price[:n], where="pre", color=SIMULATED, label="gas")
     prices.set(title="Prices", ylabel=f"[{scenario.currency}/kWh]")
     prices.set_ylim(bottom=0.0)
     weather.plot(x, scenario.outdoor[:n] - CELSIUS, color=MEASURED, label="outdoor air")
@@ -52,9 +54,9 @@ def course(run: ControlRun) -> list[Picture]:
     right.set_ylim(bottom=0.0)
     _zones(zones, run, x)
     _setpoints(setpoints, run)
+    bought = {"electricity": record.electricity[:n] / _KILO} | ({"gas": _gas(run) / _KILO} if burns else {})
     power.stackplot(
-        x, record.electricity[:n] / _KILO, _gas(run) / _KILO, labels=["electricity", "gas"],
-        colors=[MEASURED, SIMULATED], alpha=0.75, step="pre",
+        x, *bought.values(), labels=list(bought), colors=[MEASURED, SIMULATED], alpha=0.75, step="pre",
     )  # fmt: skip
     power.set(title="What it took", ylabel="power [kW]")
     for one in axes:
@@ -86,10 +88,13 @@ def _comfort_band(axes: Axes, run: ControlRun, x: FloatArray) -> None:
 def _zones(axes: Axes, run: ControlRun, x: FloatArray) -> None:
     zone = run.loop.record.zone_temperature[1 : run.study.steps + 1] - CELSIUS
     _comfort_band(axes, run, x)
-    for ends, alpha, label in (([0, 100], 0.35, "all zones"), ([10, 90], 0.45, "80 % of the zones")):
+    zones = run.study.scenario.zones
+    spread = (([0, 100], 0.35, "all zones"), ([10, 90], 0.45, "80 % of the zones"))
+    for ends, alpha, label in spread if len(zones) > 1 else ():
         low, high = np.percentile(zone, ends, axis=1)
         axes.fill_between(x, low, high, color=MUTED, alpha=alpha, linewidth=0, label=label)
-    axes.plot(x, np.median(zone, axis=1), color=style.INK, linewidth=1.2, label="median zone")
+    middle = "median zone" if len(zones) > 1 else zones[0]
+    axes.plot(x, np.median(zone, axis=1), color=style.INK, linewidth=1.2, label=middle)
     axes.set(title="Zone temperatures", ylabel="[°C]")
 
 
@@ -159,7 +164,8 @@ def expectations(run: ControlRun) -> list[Picture]:
         axes.plot(x, expected, color=SIMULATED, linewidth=1.0, label=when)
         _legend(axes)
     upper.set(title="Mean temperature of the zones", ylabel="[°C]")
-    lower.set(title="Electricity and gas, mean of the hour", ylabel="[kW]")
+    what = "Electricity and gas" if np.any(_gas(run)) else "Electricity"
+    lower.set(title=f"{what}, mean of the hour", ylabel="[kW]")
     return [picture(figure, "Expected and realised zone temperatures and power", zoom=True)]
 
 
@@ -223,7 +229,8 @@ def cost_bars(runs: Sequence[ControlRun]) -> list[Picture]:
     place = np.arange(len(runs))
     electricity, gas = np.array([[part.sum() for part in _costs(run)] for run in runs]).T
     left.barh(place, electricity, color=MEASURED, alpha=0.8, label="electricity")
-    left.barh(place, gas, left=electricity, color=SIMULATED, alpha=0.8, label="gas")
+    if gas.any():
+        left.barh(place, gas, left=electricity, color=SIMULATED, alpha=0.8, label="gas")
     left.set_yticks(place, [run.entry.title for run in runs])
     left.invert_yaxis()
     left.set_xlabel(f"energy cost [{runs[0].study.scenario.currency}]")

@@ -9,7 +9,7 @@ import pytest
 
 import calibration.fleet.run
 from calibration.fleet.case import CaseOutcome
-from mpc.cli import calibrate as _calibrate
+from mpc.cli import fleet as _fleet
 from mpc.reports.means import Means
 from mpc.reports.page import render
 from mpc.reports.warnings import case_warnings
@@ -41,8 +41,8 @@ def test_a_folder_of_cases_says_which_have_none(
     outcomes = [CaseOutcome(name, "calibrated", 0.5, 0.4, has_windows=name == "lit") for name in ("lit", "dark")]
     monkeypatch.setattr(calibration.fleet.run, "calibrate_many", lambda *_, **__: outcomes)
     settings = {"horizon": "6h"}
-    assert _calibrate._many("calibrate", [tmp_path / "lit"], tmp_path / "out", settings, 1, None, False, False) == 0
+    assert _fleet.many("calibrate", [tmp_path / "lit"], tmp_path / "out", settings, 1, None, False, False) == 0
     told = capsys.readouterr()
-    assert "warning: dark: 1 of 2 buildings have no windows" in told.err
+    assert "warning: dark: 1 of 2 buildings has no windows" in told.err
     assert "calibrated, no windows" in told.out and told.out.count("no windows") == 1
     assert outcomes[1].to_dict()["has_windows"] is False

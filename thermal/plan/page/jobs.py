@@ -14,6 +14,9 @@ Work = Callable[[Progress], Any]
 
 _KEPT = 50  # jobs whose end is remembered
 
+#: Share of a job from which on the time left is estimated [-], and how long it has run by then [s]: loading is no pace.
+_TOLD_FROM, _RAN = 0.03, 3.0
+
 
 class _StoppedError(LabelError):
     """A job that was stopped."""
@@ -45,7 +48,36 @@ class _Job:
     def to_dict(self) -> dict[str, Any]:
         """Give it as plain types, for JSON."""
         keys = ("number", "kind", "state", "stage", "done", "total", "result", "error")
-        return {key: getattr(self, key) for key in keys} | {"seconds": round(time.monotonic() - self.started, 1)}
+        seconds = time.monotonic() - self.started
+        told = {"seconds": round(seconds, 1), "left": self.left(seconds)}
+        return {key: getattr(self, key) for key in keys} | told
+
+    def tell(self, stage: str, done: int, total: int) -> None:
+        """Note how far it is; a share that is smaller than the one before leaves that standing.
+
+        Parameters
+        ----------
+        stage : str
+            What is being done.
+        done, total : int
+            How much of the whole [-]; a total of 0 is not known.
+        """
+        self.stage = stage
+        if total > 0 and done * max(self.total, 1) >= self.done * total:
+            self.done, self.total = min(done, total), total
+
+    def left(self, seconds: float) -> float | None:
+        """Estimate the time that it will still take, at the pace until now [s]; None while nobody can say.
+
+        Parameters
+        ----------
+        seconds : float
+            Since it began [s].
+        """
+        share = self.done / self.total if self.total else 0.0
+        if self.state != "runs" or share < _TOLD_FROM or seconds < _RAN:
+            return None
+        return round(seconds * (1.0 - share) / share, 1)
 
 
 #: Who waits for whom: what the page itself does takes seconds, and does not wait for a report, which takes minutes.
@@ -145,7 +177,7 @@ class Jobs:
         def progress(stage: str, done: int, total: int) -> None:
             if job.stop.is_set():
                 raise _StoppedError("stopped")
-            job.stage, job.done, job.total = stage, done, total
+            job.tell(stage, done, total)
 
         try:
             progress("", 0, 0)

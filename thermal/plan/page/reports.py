@@ -25,6 +25,10 @@ _KINDS = {
     "control.json": "control",
     "simulation.json": "simulation",
     "evaluation.json": "evaluation",
+    "experiment.json": "experiment",
+    "monitoring.json": "monitoring",
+    "identify.json": "identified plant",
+    "summary.json": "buildings of a folder",
     "check.json": "check",
 }
 _VERDICT = re.compile(r'<p class="verdict[^>]*>(.*?)</p>', re.DOTALL)

@@ -28,7 +28,9 @@ function renderJob() {
 
 const title = (kind) => WORDS[kind]?.[0] || kind;
 
-const brief = (state) => (state.state === "waiting" ? "waits" : `${state.total ? `${Math.floor((100 * state.done) / state.total)} % · ` : ""}${time(state.seconds)}`);
+const brief = (state) => (state.state === "waiting" ? "waits" : `${state.total ? `${Math.floor((100 * state.done) / state.total)} % · ` : ""}${state.left === null ? time(state.seconds) : remaining(state)}`);
+
+const remaining = (state) => `about ${time(state.left)} left`;
 
 const time = (seconds) => (seconds < 90 ? `${Math.round(seconds)} s` : `${Math.round(seconds / 60)} min`);
 
@@ -75,7 +77,7 @@ const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
 const moment = (seconds) => new Date(seconds * 1000).toLocaleString([], { dateStyle: "short", timeStyle: "short" });
 
-const words = (state) => (state.state === "waiting" ? "waits for the report before it" : `${state.stage || "working"} · ${time(state.seconds)}`);
+const words = (state) => (state.state === "waiting" ? "waits for the report before it" : `${state.stage || "working"} · ${time(state.seconds)}${state.left === null ? "" : ` · ${remaining(state)}`}`);
 
 export async function make(kind) {
   try {
