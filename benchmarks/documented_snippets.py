@@ -1,0 +1,52 @@
+"""Every block of code of README and documentation, run as it is printed: what passes, how long it takes, what is not run.
+
+    python benchmarks/documented_snippets.py --out results/snippets            # all of them; --quick as the tests do
+    python benchmarks/documented_snippets.py --out results/snippets docs/kpis.md
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import asdict
+from pathlib import Path
+
+from _snippets import ROOT, Outcome, pages, run_page, snippets
+from _table import markdown, write
+
+
+def main() -> None:
+    """Run the pages, print a line a block, and write the table."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("pages", nargs="*", type=Path, help="pages to run; all by default")
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--quick", action="store_true", help="without the blocks that are marked as slow")
+    options = parser.parse_args()
+    chosen = [page.resolve() for page in options.pages] or pages()
+    blocks = [s for page in chosen for s in snippets(page)]
+    done: dict[str, Outcome] = {}
+    for page in chosen:
+        for outcome in run_page(page, slow=not options.quick):
+            done[outcome.where] = outcome
+            print(f"{outcome.where}: {'passed' if outcome.passed else 'FAILED'}, {outcome.cpu:.1f} s of CPU", flush=True)
+            if not outcome.passed:
+                print(outcome.said, flush=True)
+    rows = []
+    for s in blocks:
+        outcome, found = done.get(s.where), s.reason
+        if outcome:
+            found = "as printed" if outcome.passed else "FAILED"
+        rows.append((s.where, s.language, s.kind, found or "not reached", f"{outcome.cpu:.1f}" if outcome else "-"))
+    counts = {kind: sum(s.kind == kind for s in blocks) for kind in ("quick", "slow", "file", "not run")}
+    failed = [where for where, outcome in done.items() if not outcome.passed]
+    said = ", ".join(f"{number} {kind}" for kind, number in counts.items())
+    table = markdown(["block", "language", "set", "result", "CPU [s]"], rows)
+    table += f"\n{len(blocks)} blocks: {said}; {len(failed)} failed.\n"
+    data = {"blocks": [asdict(s) for s in blocks], "outcomes": [asdict(o) for o in done.values()], "counts": counts}
+    write(options.out, "documented_snippets", table, data, False)
+    print(table.splitlines()[-1])
+    if failed:
+        raise SystemExit(f"failed in {ROOT.name}: " + ", ".join(failed))
+
+
+if __name__ == "__main__":
+    main()
