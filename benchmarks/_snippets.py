@@ -1,11 +1,15 @@
-"""Blocks of code of the documentation, run as they are printed: each page in a folder and a process of its own, in order.
+"""Blocks of code of the documentation, run as printed: each page in a folder and a process of its own, in order.
 
-A block is what stands between two fences. In a language that runs (`sh`, `console`, `python`) it runs; with a title it is
-written as the file of that name. A comment on the line above, which the pages do not show, says what else is to be known:
+A block is what stands between two fences. In a language that runs (`sh`, `console`, `python`) it runs; with a title it
+is written as the file of that name. A comment on the line above, which the pages do not show, says what else counts:
 
     <!-- snippet: slow -->                      run in the slow set alone, as it takes over some seconds
     <!-- snippet: background -->                left running once it has named its address; ended at the page's end
-    <!-- snippet: not run: needs a database --> neither; with the reason
+    <!-- snippet: needs pyenergyplus -->        run where that module is installed
+    <!-- snippet: not run: needs a database --> none of these; with the reason
+
+They may be combined, `slow, background`. A reader is taken to have the checkout's `examples` and `benchmarks`, and
+files of the names in `GIVEN`.
 """
 
 from __future__ import annotations
@@ -18,6 +22,7 @@ import linecache
 import os
 import re
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -26,13 +31,15 @@ import time
 import traceback
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 ROOT = Path(__file__).parents[1]
 BLOCK = re.compile(
-    r"^(?:<!-- snippet: (?P<mark>[^\n]*?) -->\n)?```(?P<language>\w*)(?: title=\"(?P<title>[^\"\n]+)\")?\n(?P<text>.*?)^```$",
+    r"^(?:<!-- snippet: (?P<mark>[^\n]*?) -->\n)?"
+    r"```(?P<language>\w*)(?: title=\"(?P<title>[^\"\n]+)\")?\n(?P<text>.*?)^```$",
     re.MULTILINE | re.DOTALL,
 )
 SHELL, PYTHON = ("sh", "console"), ("python",)
@@ -66,15 +73,22 @@ class Snippet:
 
     @property
     def kind(self) -> str:
-        """What is done with it: `file`, `not run`, `slow`, or `quick`; empty where the mark or language is not known."""
+        """What is done with it: `file`, `not run`, `slow`, `quick`; empty where mark or language are not known."""
         words = {word.strip() for word in self.mark.split(",")} - {""}
         if self.reason:
             return "not run"
-        if words - {"slow", "background"} or not (self.title or self.language in (*SHELL, *PYTHON)):
+        unknown = {w for w in words - {"slow", "background"} if not w.startswith("needs ")}
+        if unknown or not (self.title or self.language in (*SHELL, *PYTHON)):
             return ""
         if self.title:
             return "file"
         return "slow" if "slow" in words else "quick"
+
+    @property
+    def missing(self) -> str:
+        """A module that the mark names and that is not installed; empty where there is none."""
+        named = re.findall(r"needs (\w+)", "" if self.reason else self.mark)
+        return next((name for name in named if find_spec(name) is None), "")
 
 
 @dataclass(frozen=True)
@@ -91,7 +105,7 @@ class Outcome:
 
 def pages() -> list[Path]:
     """README and the pages of the documentation."""
-    return [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "docs" / "tutorials").glob("*.md"))]
+    return [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 
 def snippets(page: Path) -> list[Snippet]:
@@ -120,11 +134,12 @@ def run_page(page: Path, *, slow: bool = False) -> list[Outcome]:
     list of Outcome
         Of each block that ran or was written; after the first that failed nothing is run.
     """
-    wanted = [s for s in snippets(page) if s.kind in (("file", "quick", "slow") if slow else ("file", "quick"))]
+    kinds = ("file", "quick", "slow") if slow else ("file", "quick")
+    wanted = [s for s in snippets(page) if s.kind in kinds and not s.missing]
     if all(s.kind == "file" for s in wanted):
         return []
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-        give(Path(folder))
+        give(Path(folder), "\n".join(s.text for s in wanted))
         paths = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
         here = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
         answer = subprocess.run(
@@ -141,20 +156,48 @@ def run_page(page: Path, *, slow: bool = False) -> list[Outcome]:
     return [Outcome(**outcome) for outcome in json.loads(answer.stdout)]
 
 
-def give(folder: Path) -> None:
-    """What a reader of a page is taken to have: a case of their own, here the bundled one, and the checkout's scripts."""
-    from thermal.data import bundled_case_path
-
-    case = Path(str(bundled_case_path()))
-    (folder / "cases").mkdir()
-    for name in ("CASE", "cases/office"):
-        (folder / name).symlink_to(case)
+def give(folder: Path, text: str) -> None:
+    """Put what a reader is taken to have, as far as a page's blocks name it, into a folder."""
     for name in ("benchmarks", "examples"):
         (folder / name).symlink_to(ROOT / name)
+    for name, make in GIVEN.items():
+        if re.search(rf"\b{re.escape(name)}\b", text):
+            make(folder / name)
+
+
+def _case(path: Path) -> None:
+    from thermal.data import bundled_case_path
+
+    shutil.copytree(str(bundled_case_path()), path)
+
+
+def _cases(path: Path) -> None:
+    for name in ("one", "two"):
+        _case(path / name)
+
+
+def _year(path: Path) -> None:
+    from thermal import save_case
+    from thermal.pilot.building import pilot_building
+    from thermal.pilot.twin import TwinSettings, generate_twin
+
+    office = pilot_building(1, floor_area=250.0, zones=5)
+    save_case(generate_twin(office, 0, TwinSettings(days=56.0, dx=1.0))[0], path)
+
+
+def _weather(path: Path) -> None:
+    import pyenergyplus
+
+    files = Path(pyenergyplus.__file__).parent / "data" / "weather"
+    shutil.copy(next(files.glob("USA_IL_Chicago*.epw")), path)
+
+
+#: A case, a folder of cases, a case of two months, and a weather file: what a page may name without having made it.
+GIVEN = {"CASE": _case, "CASES": _cases, "YEAR": _year, "town.epw": _weather}
 
 
 def agrees(wanted: str, found: str) -> bool:
-    """Whether a page's output is what was printed: `...` stands for anything, spaces do not count, numbers nearly agree."""
+    """Whether output is what a page says: `...` is anything, spaces do not count, numbers nearly agree."""
     pattern, numbers = "", []
     for part in re.split(rf"(\.\.\.|{NUMBER.pattern})", " ".join(wanted.split())):
         if part == "...":
@@ -165,8 +208,10 @@ def agrees(wanted: str, found: str) -> bool:
         else:
             pattern += re.escape(part)
     text = " ".join(found.split())
-    close = ([abs(float(f) - w) <= LOOSE * abs(w) for f, w in zip(m.groups(), numbers)] for m in re.finditer(pattern, text))
-    return any(all(each) for each in close)
+    return any(
+        all(abs(float(number) - w) <= LOOSE * abs(w) for number, w in zip(match.groups(), numbers, strict=True))
+        for match in re.finditer(pattern, text)
+    )
 
 
 def shell(snippet: Snippet, background: list[subprocess.Popen[str]]) -> tuple[bool, str]:
@@ -196,16 +241,19 @@ def shell(snippet: Snippet, background: list[subprocess.Popen[str]]) -> tuple[bo
 def start(call: list[str], background: list[subprocess.Popen[str]]) -> tuple[bool, str]:
     """Start a server and wait until it has named its address."""
     process = subprocess.Popen(
-        call, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True
+        call,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
     )
     background.append(process)
-    assert process.stdout is not None
     said, began = "", time.monotonic()
-    while "http://" not in said and time.monotonic() - began < START_LIMIT:
-        line = process.stdout.readline()
+    for line in process.stdout or ():
         said += line
-        if not line:
-            return False, said
+        if "http://" in said or time.monotonic() - began > START_LIMIT:
+            break
     return "http://" in said, said
 
 
@@ -243,6 +291,7 @@ def run(blocks: list[Snippet]) -> Iterator[Outcome]:
         for snippet in blocks:
             cpu, began = used(), time.monotonic()
             if snippet.kind == "file":
+                Path(snippet.title).parent.mkdir(parents=True, exist_ok=True)
                 Path(snippet.title).write_text(snippet.text, encoding="utf-8")
                 passed, said = True, ""
             elif snippet.language in SHELL:

@@ -1,7 +1,7 @@
-"""Every block of code of README and documentation, run as it is printed: what passes, how long it takes, what is not run.
+"""Every block of code of README and documentation, run as printed: what passes, its time, what is not run and why.
 
-    python benchmarks/documented_snippets.py --out results/snippets            # all of them; --quick as the tests do
-    python benchmarks/documented_snippets.py --out results/snippets docs/kpis.md
+Run: ``python benchmarks/documented_snippets.py --out results/snippets [PAGE ...]``; ``--quick`` leaves out what the tests
+leave out.
 """
 
 from __future__ import annotations
@@ -10,8 +10,16 @@ import argparse
 from dataclasses import asdict
 from pathlib import Path
 
-from _snippets import ROOT, Outcome, pages, run_page, snippets
+from _snippets import ROOT, Outcome, Snippet, pages, run_page, snippets
 from _table import markdown, write
+
+
+def _result(snippet: Snippet, outcome: Outcome | None) -> tuple[str, str]:
+    """What became of a block, and its CPU time [s]."""
+    if outcome:
+        return "as printed" if outcome.passed else "FAILED", f"{outcome.cpu:.1f}"
+    missing = f"{snippet.missing} is not installed" if snippet.missing else "not reached"
+    return snippet.reason or missing, ""
 
 
 def main() -> None:
@@ -27,15 +35,9 @@ def main() -> None:
     for page in chosen:
         for outcome in run_page(page, slow=not options.quick):
             done[outcome.where] = outcome
-            print(f"{outcome.where}: {'passed' if outcome.passed else 'FAILED'}, {outcome.cpu:.1f} s of CPU", flush=True)
-            if not outcome.passed:
-                print(outcome.said, flush=True)
-    rows = []
-    for s in blocks:
-        outcome, found = done.get(s.where), s.reason
-        if outcome:
-            found = "as printed" if outcome.passed else "FAILED"
-        rows.append((s.where, s.language, s.kind, found or "not reached", f"{outcome.cpu:.1f}" if outcome else "-"))
+            said = "passed" if outcome.passed else f"FAILED\n{outcome.said}\n"
+            print(f"{outcome.where}: {outcome.cpu:.1f} s of CPU, {said}", flush=True)
+    rows = [(s.where, s.language, s.kind, *_result(s, done.get(s.where))) for s in blocks]
     counts = {kind: sum(s.kind == kind for s in blocks) for kind in ("quick", "slow", "file", "not run")}
     failed = [where for where, outcome in done.items() if not outcome.passed]
     said = ", ".join(f"{number} {kind}" for kind, number in counts.items())
