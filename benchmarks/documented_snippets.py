@@ -1,7 +1,7 @@
 """Every block of code of README and documentation, run as printed: what passes, its time, what is not run and why.
 
-Run: ``python benchmarks/documented_snippets.py --out results/snippets [PAGE ...]``; ``--quick`` leaves out what the tests
-leave out.
+Run: ``python benchmarks/documented_snippets.py --out results/snippets [PAGE ...]``; ``--quick`` leaves out
+what the tests leave out.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from _table import markdown, write
 
 
 def _result(snippet: Snippet, outcome: Outcome | None) -> tuple[str, str]:
-    """What became of a block, and its CPU time [s]."""
+    """Say what became of a block, and its CPU time [s]."""
     if outcome:
         return "as printed" if outcome.passed else "FAILED", f"{outcome.cpu:.1f}"
     missing = f"{snippet.missing} is not installed" if snippet.missing else "not reached"
