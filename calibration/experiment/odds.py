@@ -179,7 +179,7 @@ def separation(
             problem, fit = at[other.effect], other.fit
             error, slopes = _errors_and_slopes(other, problem)
             differ = error - before[other.effect] - reference
-            told = np.isfinite(differ)  # a step that the experiment changes too suddenly tells nothing, nor one as it was
+            told = np.isfinite(differ)  # a step that changes too suddenly, in either, tells nothing
             weight = float(np.sqrt(problem.effective_size() / told.sum() / own.fit.found.mean_square))
             count = fit.problem.effective_size() + problem.effective_size()
             jacobian, pair, differ = fit.found.jacobian, (true, other.effect), differ[told]

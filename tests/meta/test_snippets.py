@@ -45,10 +45,21 @@ def test_every_block_is_run_or_says_why_not(runner: Any) -> None:
         found, text = runner.snippets(page), page.read_text(encoding="utf-8")
         fences = len(re.findall(r"^ *```", text, re.MULTILINE))
         if fences != 2 * len(found) or text.count("<!-- snippet:") != sum(bool(s.mark) for s in found):
-            wrong.append(f"{page.name}: expected a mark on the line above a fence, and fences at the left; found {fences} fences")
+            wrong.append(
+                f"{page.name}: expected a mark on the line above a fence, and fences at the left; found {fences} fences"
+            )
         blocks += found
-    wrong += [f"{s.where}: expected sh, console, python or a title; found '{s.language}', '{s.mark}'" for s in blocks if not s.kind]
-    wrong += [f"{s.where}: {path}: no such file" for s in blocks for path in re.findall(r"(?:tests|benchmarks)/[\w/.]+", s.reason) if not (ROOT / path).exists()]
+    wrong += [
+        f"{s.where}: expected sh, console, python or a title; found '{s.language}', '{s.mark}'"
+        for s in blocks
+        if not s.kind
+    ]
+    wrong += [
+        f"{s.where}: {path}: no such file"
+        for s in blocks
+        for path in re.findall(r"(?:tests|benchmarks)/[\w/.]+", s.reason)
+        if not (ROOT / path).exists()
+    ]
     run = [s for s in blocks if s.kind in ("quick", "slow")]
     assert not wrong, "\n".join(wrong)
     assert len(run) > 2 * sum(s.kind == "not run" for s in blocks) and len(run) > 50
