@@ -177,12 +177,13 @@ def separation(
         reference = _errors(own, at[true]) - before[true]
         for other in (m for m in members if m.effect != true):
             problem, fit = at[other.effect], other.fit
-            error, slopes = problem.residuals(fit.model, fit.theta)
-            weight = float(np.sqrt(problem.effective_size() / error.size / own.fit.found.mean_square))
-            count = fit.problem.effective_size() + problem.effective_size()
-            jacobian, pair = fit.found.jacobian, (true, other.effect)
+            error, slopes = _errors_and_slopes(other, problem)
             differ = error - before[other.effect] - reference
-            precision, turned = jacobian.T @ jacobian, slopes * problem.slopes(fit.theta)
+            told = np.isfinite(differ)  # a step that changes too suddenly, in either, tells nothing
+            weight = float(np.sqrt(problem.effective_size() / told.sum() / own.fit.found.mean_square))
+            count = fit.problem.effective_size() + problem.effective_size()
+            jacobian, pair, differ = fit.found.jacobian, (true, other.effect), differ[told]
+            precision, turned = jacobian.T @ jacobian, slopes[told] * problem.slopes(fit.theta)
             log_odds[pair] = expected_log_odds(differ, turned, precision, weight, count)
             swing[pair] = float(np.sqrt(np.mean(differ**2)))
     return Separation(log_odds, swing)
@@ -203,7 +204,15 @@ def seen_before(members: Sequence[Member], share: float) -> dict[tuple[str, str]
 
 
 def _errors(member: Member, problem: Problem) -> FloatArray:
-    return problem.residuals_only(member.fit.model, member.fit.theta)
+    """Errors of all runs, NaN where none is told, so that those of other telemetry of the same steps compare."""
+    parts = (problem.errors(member.fit.model, member.fit.theta, runs, slopes=False)[0] for runs in problem.runs)
+    return np.concatenate([error.ravel() for error in parts])
+
+
+def _errors_and_slopes(member: Member, problem: Problem) -> tuple[FloatArray, FloatArray]:
+    parts = [problem.errors(member.fit.model, member.fit.theta, runs, slopes=True) for runs in problem.runs]
+    slopes = [moved.reshape(error.size, -1) for error, moved in parts if moved is not None]
+    return np.concatenate([error.ravel() for error, _ in parts]), np.concatenate(slopes)
 
 
 def _problem(emulator: Emulator, member: Member, made: Emulated, interval: Interval, horizon: str) -> Problem:

@@ -26,6 +26,7 @@ def test_every_example_is_tested_here() -> None:
         "close_the_loop",
         "make_the_pilot",
         "linear_response",
+        "draw_an_office",
     }
 
 
@@ -74,3 +75,14 @@ def test_close_the_loop() -> None:
     cold, usual = example.run(311.0), example.run()
     assert cold.tdis_tot > usual.tdis_tot + 0.05
     assert 0.1 < usual.ener_tot < 1.0
+
+
+def test_draw_an_office(tmp_path: Path) -> None:
+    """Its drawings are read as the rooms that were drawn, its export as their telemetry."""
+    from PIL import Image
+
+    load("draw_an_office").draw(tmp_path, days=1)
+    assert {p.name for p in tmp_path.iterdir()} == {"F1.png", "F2.png", "devices.csv", "export.csv", "plans.yaml", "windows.yaml"}
+    assert Image.open(tmp_path / "F1.png").size[0] == 2 * 40 + 16.0 / 0.05  # paper, and 16 m of wall
+    table = (tmp_path / "export.csv").read_text().splitlines()
+    assert len(table) == 289 and "VAV-F1-C01 ZAT" in table[0]

@@ -22,8 +22,8 @@ DOCS = Path(__file__).parents[2] / "docs"
 def follow(guide: str, folder: Path) -> Path:
     """Write the file of a guide and run its command on the bundled case; the folder of its results."""
     text = (DOCS / guide).read_text(encoding="utf-8")
-    name = re.search(r"`(\w+\.py)`:\n", text)
-    code, command = (re.search(rf"```{kind}\n(.*?)```", text, re.DOTALL) for kind in ("python", "console"))
+    name = re.search(r'title="(\w+\.py)"', text)
+    code, command = (re.search(rf"```{kind}[^\n]*\n(.*?)```", text, re.DOTALL) for kind in ("python", "sh"))
     assert name and code and command, guide
     plugin, out = folder / name[1], folder / "out"
     plugin.write_text(code[1], encoding="utf-8")

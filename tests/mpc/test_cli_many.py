@@ -180,7 +180,7 @@ def test_the_missing_extra_is_named(cases: Path, tmp_path: Path, monkeypatch: py
 def test_workers_load_the_plugins(cases: Path, tmp_path: Path) -> None:
     """An effect that only a plugin has is known in the processes of the workers."""
     text = Path(__file__).parents[2].joinpath("docs", "own_effect.md").read_text(encoding="utf-8")
-    code = re.search(r"```python\n(.*?)```", text, re.DOTALL)
+    code = re.search(r"```python[^\n]*\n(.*?)```", text, re.DOTALL)
     assert code is not None
     (tmp_path / "night_machines.py").write_text(code[1], encoding="utf-8")
     shutil.copytree(cases / NAMES[0], tmp_path / "cases" / NAMES[0])

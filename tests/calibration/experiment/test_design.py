@@ -136,6 +136,9 @@ def test_what_a_member_emulates_it_predicts(case: Case) -> None:
     assert all(v > 0.0 for v in found.log_odds.values())
     same = separation(emulator, {"flow_gain": usual}, usual, members, window, "6h")
     assert same.log_odds["flow_gain", "valve_leak"] == pytest.approx(0.0, abs=1e-9)
+    jumped = moved["flow_gain"].zone + 8.0 * (np.arange(48) == 20)[:, None]  # too sudden a step: its errors do not count
+    sudden = separation(emulator, {"flow_gain": replace(moved["flow_gain"], zone=jumped)}, usual, members, window, "6h")
+    assert 0.0 < sudden.log_odds["flow_gain", "valve_leak"] < np.inf
 
 
 def told(case: Case) -> dict[str, Any]:

@@ -33,7 +33,7 @@ Make = Callable[..., Path]
 
 def blocks(kind: str) -> list[str]:
     """Blocks of code of the guide."""
-    return re.findall(rf"```{kind}\n(.*?)```", GUIDE.read_text(encoding="utf-8"), re.DOTALL)
+    return re.findall(rf"```{kind}[^\n]*\n(.*?)```", GUIDE.read_text(encoding="utf-8"), re.DOTALL)
 
 
 @pytest.fixture
