@@ -25,6 +25,7 @@ from mpc.cli.imports import import_devices, import_plan, import_telemetry
 from mpc.cli.monitor import monitor
 from mpc.cli.options import displaying, switch, value
 from mpc.cli.serve import label, serve
+from mpc.cli.verify import verify
 from mpc.plugins import load_plugins
 from thermal.errors import Described
 
@@ -114,11 +115,11 @@ def _report(error: Exception, command: str, json: bool) -> int:
     return code
 
 
-_REPORTING = (demo, check, simulate, evaluate, calibrate, diagnose, experiment, monitor, control, compare)
+_REPORTING = (demo, check, simulate, evaluate, calibrate, diagnose, experiment, monitor, control, compare, verify)
 
 for _command in (
     *(demo, doctor, check, import_plan, import_devices, import_telemetry, label),
-    *(simulate, evaluate, calibrate, diagnose, experiment, monitor, effects, identify, control, compare, serve),
+    *(simulate, evaluate, calibrate, diagnose, experiment, monitor, effects, identify, control, compare, verify, serve),
 ):
     app.command()(_guarded(displaying(_command) if _command in _REPORTING else _command))
 
