@@ -133,8 +133,7 @@ def control(
         str,
         value(
             "mpc, schedule, reset, guideline36, bound (perfect knowledge), of a plant.yaml mpc, full_speed or own, or "
-            "one of a plugin.",
-            "NAME",
+            "one of a plugin.", "NAME",
         ),
     ] = "mpc",
 ) -> int:
@@ -171,8 +170,7 @@ def compare(
         str | None,
         value(
             "Among schedule, reset, guideline36, mpc, bound, of a plant.yaml own, full_speed, mpc, those of plugins; "
-            "default: all of these.",
-            "A,B,...",
+            "default: all of these.", "A,B,...",
         ),
     ] = None,
 ) -> int:

@@ -37,7 +37,9 @@ def monitor(
     from mpc.reports.monitoring import monitoring_summary, write_monitoring
 
     loaded = options.open_case(case, out, force)
-    settings = MonitorSettings(reference_days, horizon, dx, options.ids(effects) or None, options.ids(rule_out))
+    settings = MonitorSettings(
+        reference_days, horizon, dx, options.ids(effects) or None, options.ids(rule_out)
+    )
     with Waiting(f"monitor {case.name}") as progress:
         found = watch(loaded, parameters, settings, progress=progress)
         report = write_monitoring(found, out, force=force)
