@@ -95,7 +95,7 @@ def comparison_sentence(found: Verification) -> str:
         )
     )
     end = "the two differ" if differs else "within what chance can do"
-    return f"Shadow operation expected {percent(found.predicted.value)}; realised is {points} of that: {end}."
+    return f"Shadow operation expected {percent(found.predicted.value)}; realised less expected is {points}: {end}."
 
 
 def verification_means(found: Verification) -> Means:

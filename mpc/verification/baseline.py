@@ -259,7 +259,9 @@ def _hourly_design(table: pd.DataFrame, occupied: frozenset[int], knots: FloatAr
     return np.hstack([of_week, parts * works, parts * ~works])
 
 
-def judge_baseline(model: BaselineModel, table: pd.DataFrame, extra: tuple[str, ...] = ()) -> Fitness:
+def judge_baseline(
+    model: BaselineModel, table: pd.DataFrame, extra: tuple[str, ...] = (), *, hold_out: bool = True
+) -> Fitness:
     """Say how well a baseline describes the table that it was fitted to, and parts that a fit had not seen.
 
     Parameters
@@ -270,13 +272,15 @@ def judge_baseline(model: BaselineModel, table: pd.DataFrame, extra: tuple[str, 
         Days or hours.
     extra : tuple of str
         As it was fitted with.
+    hold_out : bool
+        Whether parts are held out, which takes five fits.
     """
     power = table["power"].to_numpy()
     mean, error = float(power.mean()), power - model.predict(table)
     parameters = int(np.linalg.matrix_rank(model.design(table))) + len(model.change_points)
     freedom = max(1, len(power) - parameters)
     days = daily_sums(error, table, model.kind)
-    held = _held_out(model.kind, table, extra)
+    held = _held_out(model.kind, table, extra) if hold_out else []
     return Fitness(
         float(np.sqrt(error @ error / freedom)) / mean, float(error.sum()) / freedom / mean,
         1.0 - float(error @ error) / float(np.sum((power - mean) ** 2)),

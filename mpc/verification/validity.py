@@ -169,7 +169,7 @@ def _changes(first: pd.DataFrame, second: pd.DataFrame, one: str, other: str) ->
     else:
         share = people.value / max(abs(float(first["occupancy"].mean())), 1e-9)
         changed = people.p_value < _LEVEL and abs(share) > _OCCUPANCY
-        yield Check("occupancy", not changed, f"{share:+.0%} from {one} to {other}",
+        yield Check("occupancy", not changed, f"{share:+.1%} from {one} to {other}",
                     "a non-routine change: put it into the model with --adjust" if changed else "")  # fmt: skip
     warmth = _difference(first, second, "zone")
     if warmth is None:
