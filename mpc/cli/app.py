@@ -15,6 +15,7 @@ from typing import Annotated, Any, ParamSpec
 import typer
 
 from mpc.cli.calibrate import calibrate, diagnose
+from mpc.cli.case import case_from, case_pack
 from mpc.cli.control import compare, control, demo
 from mpc.cli.doctor import doctor
 from mpc.cli.effects import effects
@@ -122,6 +123,11 @@ for _command in (
     *(simulate, evaluate, calibrate, diagnose, experiment, monitor, effects, identify, control, compare, verify, serve),
 ):
     app.command()(_guarded(displaying(_command) if _command in _REPORTING else _command))
+
+_cases = typer.Typer(no_args_is_help=True, help="Cases out of a historian.")
+for _name, _command in (("from", case_from), ("pack", case_pack)):
+    _cases.command(_name)(_guarded(_command))
+app.add_typer(_cases, name="case")
 
 
 def main() -> None:

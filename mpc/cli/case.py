@@ -31,8 +31,8 @@ def case_from(
     Example: buildingmpc case from postgresql://me@localhost/site --building cases/office --start 2026-01-05
     --end 2026-03-02 --out cases/winter
     """
-    from mpc.cli.imports import telemetry_answer
-    from thermal.case.case import Case
+    from mpc.cli.imports import seconds_of, telemetry_answer
+    from thermal.case.case import Case, local_timestamp
     from thermal.case.load import load_building
     from thermal.case.save import check_target
     from thermal.intake.historian import historian_telemetry
@@ -43,7 +43,9 @@ def case_from(
     there = load_building(building)
     with Waiting("case from historian") as progress:
         listed = read_matches(points) if points is not None else None
-        found = historian_telemetry(there, address, (start, end), step, schema, listed, progress=progress)
+        period = local_timestamp(start, there), local_timestamp(end, there)
+        length = seconds_of(step, "--step") or 300.0
+        found = historian_telemetry(there, address, period, length, listed, schema=schema, progress=progress)
         source = building.parent if building.is_file() else building
         folder = save_with_labels(Case(there, found.telemetry), source, out, overwrite=force)
     return telemetry_answer(found, folder, json)

@@ -2,21 +2,32 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from thermal._types import FloatArray, IntArray
+from thermal.case.building import Building
 from thermal.case.points import POINT_TYPES
-from thermal.case.telemetry import INDEX
-from thermal.errors import PlanError
-from thermal.intake.resample import LEAST_COVERED, step_means
+from thermal.case.telemetry import INDEX, LONGEST_STEP
+from thermal.errors import CaseError, PlanError
+from thermal.intake.resample import LEAST_COVERED, LONGEST_COMMAND, step_means
 from thermal.intake.series import RawSeries
 from thermal.intake.source import shown
+from thermal.intake.stamps import ClockReport
+from thermal.intake.telemetry import (
+    SHORTEST_STEP,
+    ImportSettings,
+    TelemetryImport,
+    match_series,
+    telemetry_of_series,
+)
 from thermal.plan.guard import extra
+from thermal.plan.match import PointMatch
 from thermal.units import QUANTITIES
 
 #: Schema that live operation keeps its samples in.
@@ -78,20 +89,74 @@ def read_historian(
     """
     count = round((end - start).total_seconds() / step)
     PlanError.unless(count >= 2, "interval", "two steps or more", f"{start} to {end}", "give a later --end")
-    ends = pd.date_range(start + pd.Timedelta(seconds=step), periods=count, freq=pd.Timedelta(seconds=step), name=INDEX)
+    length = pd.Timedelta(seconds=step)
+    lead = math.ceil(LONGEST_COMMAND / step)  # what was set the day before may still hold
+    first = start - lead * length
+    ends = pd.date_range(first + length, periods=lead + count, freq=length, name=INDEX)
     with _connected(address, schema) as cursor:
         names = dict(cursor.execute("SELECT id, name FROM point ORDER BY name").fetchall())
         PlanError.unless(names, shown(address), "a historian with points", "none")
         steps = _Steps(list(names), ends, step)
-        days = _days(start, end)
+        days = _days(first, end)
         for number, day in enumerate(days):
             if progress is not None:
                 progress("reading samples", number, len(days))
             for points, samples in _samples_of(cursor, day):
                 steps.add(points, samples)
-    found = {name: _series(name, steps.means(row, name), ends) for row, name in enumerate(names.values())}
-    PlanError.unless(any(found.values()), shown(address), f"samples from {start} to {end}", "none", "look at --start and --end")
+    found = {name: _series(name, steps.means(row, name), ends, lead) for row, name in enumerate(names.values())}
+    PlanError.unless(
+        any(found.values()), shown(address), f"samples from {start} to {end}", "none", "look at --start and --end"
+    )
     return {name: series for name, series in found.items() if series is not None}
+
+
+def historian_telemetry(
+    building: Building,
+    address: str,
+    period: tuple[pd.Timestamp, pd.Timestamp],
+    step: float,
+    matches: Sequence[PointMatch] | None = None,
+    *,
+    schema: str = SCHEMA,
+    progress: Progress | None = None,
+) -> TelemetryImport:
+    """Make telemetry of a building from a historian.
+
+    Parameters
+    ----------
+    building : Building
+        Whose zones and devices the points are of.
+    address : str
+        ``postgresql://USER:PASSWORD@HOST/DATABASE``.
+    period : tuple of Timestamp
+        Beginning of the first step and end of the last, local.
+    step : float
+        Length of the steps [s], 60 to 7200.
+    matches : sequence of PointMatch, optional
+        What points are, corrected by a person; default: matched by name.
+    schema : str
+        As for `read_historian`.
+    progress : callable, optional
+        Told stage, days done and all days.
+
+    Returns
+    -------
+    TelemetryImport
+        Telemetry, and all that was done.
+
+    Raises
+    ------
+    PlanError
+        The historian cannot be read, or no point is matched.
+    CaseError
+        An entity is none of the building's, or the steps are out of range.
+    """
+    fits = SHORTEST_STEP <= step <= LONGEST_STEP and not 86400.0 % step
+    expected = f"{SHORTEST_STEP:g} to {LONGEST_STEP:g} s that divide a day"
+    CaseError.unless(fits, "step", expected, f"{step:g} s", "such as 5min, 15min or 1h")
+    series = read_historian(address, *period, step, schema, progress)
+    listed = tuple(matches) if matches is not None else match_series(building, series)
+    return telemetry_of_series(building, series, ClockReport(), ImportSettings(step=step), listed, shown(address))
 
 
 def pack_days(address: str, before: pd.Timestamp, schema: str = SCHEMA) -> int:
@@ -142,21 +207,6 @@ def pack_days(address: str, before: pd.Timestamp, schema: str = SCHEMA) -> int:
             )  # fmt: skip
             done += 1
         return done
-
-
-def has_historian(address: str, schema: str = SCHEMA) -> bool:
-    """Whether a database has a historian's tables.
-
-    Parameters
-    ----------
-    address : str
-        ``postgresql://USER:PASSWORD@HOST/DATABASE``.
-    schema : str
-        As for `read_historian`.
-    """
-    with _connected(address, schema) as cursor:
-        found = cursor.execute("SELECT to_regclass('point') IS NOT NULL AND to_regclass('sample') IS NOT NULL")
-        return bool(found.fetchone()[0])
 
 
 class _connected:  # noqa: N801 - used as a function
@@ -267,8 +317,9 @@ def _holds(name: str) -> bool:
     return name.endswith(("setpoint", "command"))
 
 
-def _series(name: str, means: FloatArray | None, ends: pd.DatetimeIndex) -> RawSeries | None:
-    if means is None or not np.isfinite(means).any():
+def _series(name: str, means: FloatArray | None, ends: pd.DatetimeIndex, lead: int) -> RawSeries | None:
+    """Give a point from the step after the lead on; None where nothing is known of it."""
+    if means is None or not np.isfinite(means[lead:]).any():
         return None
     kind = POINT_TYPES.get(name.rpartition("/")[2])
-    return RawSeries(name, pd.Series(means, index=ends), QUANTITIES[kind.quantity].unit if kind is not None else "")
+    return RawSeries(name, pd.Series(means, index=ends)[lead:], QUANTITIES[kind.quantity].unit if kind is not None else "")
