@@ -17,6 +17,7 @@ import typer
 from mpc.cli.calibrate import calibrate, diagnose
 from mpc.cli.case import case_from, case_pack
 from mpc.cli.control import compare, control, demo
+from mpc.cli.discover import discover
 from mpc.cli.doctor import doctor
 from mpc.cli.effects import effects
 from mpc.cli.evaluate import check, evaluate, simulate
@@ -119,7 +120,7 @@ def _report(error: Exception, command: str, json: bool) -> int:
 _REPORTING = (demo, check, simulate, evaluate, calibrate, diagnose, experiment, monitor, control, compare, verify)
 
 for _command in (
-    *(demo, doctor, check, import_plan, import_devices, import_telemetry, label),
+    *(demo, doctor, check, import_plan, import_devices, import_telemetry, discover, label),
     *(simulate, evaluate, calibrate, diagnose, experiment, monitor, effects, identify, control, compare, verify, serve),
 ):
     app.command()(_guarded(displaying(_command) if _command in _REPORTING else _command))

@@ -322,4 +322,5 @@ def _series(name: str, means: FloatArray | None, ends: pd.DatetimeIndex, lead: i
     if means is None or not np.isfinite(means[lead:]).any():
         return None
     kind = POINT_TYPES.get(name.rpartition("/")[2])
-    return RawSeries(name, pd.Series(means, index=ends)[lead:], QUANTITIES[kind.quantity].unit if kind is not None else "")
+    unit = QUANTITIES[kind.quantity].unit if kind is not None else ""
+    return RawSeries(name, pd.Series(means, index=ends)[lead:], unit)
