@@ -24,7 +24,11 @@ def device() -> Iterator[str]:
 
     async def run() -> None:
         server = rusty_bacnet.BACnetServer(
-            device_instance=1001, device_name="VAV_1", interface="127.0.0.1", port=0, broadcast_address="127.255.255.255"
+            device_instance=1001,
+            device_name="VAV_1",
+            interface="127.0.0.1",
+            port=0,
+            broadcast_address="127.255.255.255",
         )
         for number in range(1, 13):
             server.add_analog_input(number, f"sensor {number}", present_value=20.0)
