@@ -9,7 +9,7 @@ import pandas as pd
 
 from mpc.errors import VerificationError
 from mpc.verification.inference import lag_one
-from thermal._types import FloatArray
+from thermal._types import FloatArray, IntArray
 
 #: Candidates of change points: percentiles of the outdoor temperature [%].
 _CANDIDATES = np.arange(10.0, 91.0, 5.0)
@@ -216,7 +216,7 @@ def _daily_columns(
             yield name, table[name].to_numpy(dtype=float)
 
 
-def hour_of_week(table: pd.DataFrame) -> FloatArray:
+def hour_of_week(table: pd.DataFrame) -> IntArray:
     """Hours since Monday, 0 to 167, of hours that end at the stamps, shape (n_hour,).
 
     Parameters
@@ -236,8 +236,8 @@ def _fit_hourly(table: pd.DataFrame) -> BaselineModel:
         [np.ones(len(table)), np.maximum(_HEATS_BELOW - outdoor, 0.0), np.maximum(outdoor - _COOLS_ABOVE, 0.0)]
     )
     above = power > rough @ np.linalg.lstsq(rough, power, rcond=None)[0]
-    share = pd.Series(above).groupby(hour).mean()
-    occupied = frozenset(int(h) for h, s in share.items() if s > _OCCUPIED)
+    share = np.bincount(hour, weights=above, minlength=168) / np.maximum(1, np.bincount(hour, minlength=168))
+    occupied = frozenset(np.flatnonzero(share > _OCCUPIED).tolist())
     knots = np.unique(np.percentile(outdoor, np.linspace(0.0, 100.0, _INTERVALS + 1)))
     design = _hourly_design(table, occupied, knots)
     found = np.linalg.lstsq(design, power, rcond=None)[0]
@@ -318,7 +318,7 @@ def daily_sums(values: FloatArray, table: pd.DataFrame, kind: str) -> FloatArray
     if kind != "time-of-week":
         return values
     begins = pd.DatetimeIndex(table.index) - pd.Timedelta(hours=1)
-    return pd.Series(values).groupby(begins.normalize()).mean().to_numpy()
+    return pd.Series(values).groupby(begins.normalize()).mean().to_numpy(dtype=float)
 
 
 def describe(model: BaselineModel) -> dict[str, Any]:

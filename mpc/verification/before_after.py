@@ -75,9 +75,10 @@ class BeforeAfter:
     def _daily_cv(self) -> float:
         """CV(RMSE) of the daily residuals of the baseline period [-]."""
         of = self.days[self.days["reporting"] == 0.0]
-        error = of["power"] - of["baseline"]
+        power = of["power"].to_numpy(dtype=float)
+        error = power - of["baseline"].to_numpy(dtype=float)
         freedom = max(1, len(of) - (self.fitness.parameters if self.model.kind == "change-point" else 1))
-        return float(np.sqrt(error @ error / freedom) / of["power"].mean())
+        return float(np.sqrt(error @ error / freedom) / power.mean())
 
 
 def before_after(

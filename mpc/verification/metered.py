@@ -85,8 +85,8 @@ class Metered:
         """
         begins = pd.DatetimeIndex(self.hours.index) - pd.Timedelta(hours=1)
         by_day = self.hours.groupby(begins.normalize())
-        length = by_day.size().reindex(by_day.size().index)
-        days = by_day.mean().where(by_day.count().ge(LEAST_OF_A_DAY * np.maximum(length, 23).to_numpy()[:, None]))
+        length = by_day.size().clip(lower=23).to_numpy()  # a day at the end of the span is no whole one
+        days = by_day.mean().where(by_day.count().ge(LEAST_OF_A_DAY * length[:, None]))
         if "zone" in self.hours:
             days["zone_start"] = self.hours["zone"][begins.hour < 2].groupby(begins[begins.hour < 2].normalize()).mean()
         if "acts" in days:

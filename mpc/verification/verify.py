@@ -250,4 +250,5 @@ def _from_first_switch(days: pd.DataFrame) -> pd.DataFrame:
     if len(lengths) < 3 or lengths.iloc[0] <= lengths.iloc[1:].max():
         return days
     first = acts.index[runs == 1][0]
-    return days[days.index >= first - pd.Timedelta(days=int(lengths.iloc[1:].max()))]
+    kept: pd.DataFrame = days[days.index >= first - pd.Timedelta(days=int(lengths.iloc[1:].max()))]
+    return kept
