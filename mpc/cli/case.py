@@ -21,7 +21,7 @@ def case_from(
     start: options.Start,
     end: Annotated[str, typer.Option(metavar="T", help="End, likewise.")],
     step: Annotated[str, options.value("Steps of 1min to 2h to average over.", "STEP")] = "5min",
-    points: Annotated[Path | None, options.file("points.csv, corrected by hand; default: matched by name.")] = None,
+    points: Annotated[Path | None, options.file("points.csv or proposal.yaml; default: by name.")] = None,
     schema: Schema = "buildingmpc",
     force: options.Force = False,
     json: options.Json = False,
@@ -36,13 +36,13 @@ def case_from(
     from thermal.case.load import load_building
     from thermal.case.save import check_target
     from thermal.intake.historian import historian_telemetry
+    from thermal.plan.discovery import read_points
     from thermal.plan.folder import save_with_labels
-    from thermal.plan.match import read_matches
 
     check_target(out, force)
     there = load_building(building)
     with Waiting("case from historian") as progress:
-        listed = read_matches(points) if points is not None else None
+        listed = read_points(points, there) if points is not None else None
         period = local_timestamp(start, there), local_timestamp(end, there)
         length = seconds_of(step, "--step") or 300.0
         found = historian_telemetry(there, address, period, length, listed, schema=schema, progress=progress)

@@ -104,7 +104,7 @@ def import_telemetry(
         str, typer.Argument(metavar="SOURCE", help="Parquet, CSV, Excel or postgresql://; columns of any names.")
     ],
     out: Annotated[Path, typer.Option(metavar="DIR", help="Case folder to make, with this telemetry.")],
-    points: Annotated[Path | None, file("points.csv, corrected by hand; default: matched by name.")] = None,
+    points: Annotated[Path | None, file("points.csv or proposal.yaml; default: by name.")] = None,
     unit: Annotated[
         list[str] | None, value("Unit in the table, repeatable; of energy for counters.", "POINT=UNIT")
     ] = None,
@@ -124,12 +124,12 @@ def import_telemetry(
     from thermal.intake.stamps import checked_zone
     from thermal.intake.telemetry import ImportSettings
     from thermal.intake.telemetry import import_telemetry as read
+    from thermal.plan.discovery import read_points
     from thermal.plan.folder import save_with_labels
-    from thermal.plan.match import read_matches
 
     building = load_building(case)
     settings = ImportSettings(table, checked_zone(tz, "--tz"), seconds_of(resample, "--resample"), _units(unit or ()))
-    found = read(building, source, settings, read_matches(points) if points is not None else None)
+    found = read(building, source, settings, read_points(points, building) if points is not None else None)
     new = Case(building, found.telemetry)
     folder = save_with_labels(new, case.parent if case.is_file() else case, out, overwrite=force)
     return telemetry_answer(found, folder, json)

@@ -318,7 +318,7 @@ def daily_sums(values: FloatArray, table: pd.DataFrame, kind: str) -> FloatArray
     if kind != "time-of-week":
         return values
     begins = pd.DatetimeIndex(table.index) - pd.Timedelta(hours=1)
-    return pd.Series(values).groupby(begins.normalize()).mean().to_numpy(dtype=float)
+    return np.asarray(pd.Series(values).groupby(begins.normalize()).mean(), dtype=float)
 
 
 def describe(model: BaselineModel) -> dict[str, Any]:

@@ -115,11 +115,11 @@ def coefficient_parts(design: FloatArray, residual: FloatArray, towards: FloatAr
     Parameters
     ----------
     design : ndarray, shape (n_row, n_coefficient)
-        Of the regression.
+        Of the regression [any].
     residual : ndarray, shape (n_row,)
         Of the fit [any].
     towards : ndarray, shape (n_coefficient,)
-        Weights of the coefficients in the sum.
+        Weights of the coefficients in the sum [any].
 
     Notes
     -----

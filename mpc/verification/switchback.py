@@ -144,7 +144,7 @@ def runs_of(acts: FloatArray) -> FloatArray:
     Parameters
     ----------
     acts : ndarray, shape (n_day,)
-        0 or 1.
+        0 or 1 [-].
     """
     return np.concatenate([[0], np.cumsum(np.diff(acts) != 0.0)])
 

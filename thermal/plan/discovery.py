@@ -14,7 +14,7 @@ from thermal.case.points import POINT_TYPES
 from thermal.errors import CaseError, PlanError
 from thermal.plan.devices import DeviceImport, key
 from thermal.plan.guard import checked_file, first_fault, reading, vocabulary
-from thermal.plan.match import EntityNames, PointMatch, settled
+from thermal.plan.match import EntityNames, PointMatch, read_matches, settled
 from thermal.units import check_unit
 
 #: Confidence from which a match is not called doubtful [-]: chosen on the generated names of seeds 0 to 9 of
@@ -234,6 +234,26 @@ def write_proposal(proposal: Proposal, path: str | PathLike[str]) -> Path:
     file = Path(path)
     file.write_text(head + yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=120), encoding="utf-8")
     return file
+
+
+def read_points(path: str | PathLike[str], building: Building) -> tuple[PointMatch, ...]:
+    """Read what columns are, from a list or from a proposal.
+
+    Parameters
+    ----------
+    path : str or path
+        ``points.csv``, or the YAML of a proposal: its confirmed points.
+    building : Building
+        Whose entities they are of.
+
+    Raises
+    ------
+    PlanError
+        As of `thermal.plan.match.read_matches` and `read_proposal`.
+    """
+    if Path(path).suffix.lower() in (".yaml", ".yml"):
+        return read_proposal(path, building).matches()
+    return read_matches(path)
 
 
 def read_proposal(path: str | PathLike[str], building: Building) -> Proposal:
