@@ -4,7 +4,7 @@ A PostgreSQL server of its own is filled with some days of the pilot building's 
 them. The case is made as `buildingmpc case from` makes it, at steps of 5 minutes. A year is so many days at the same
 rate; what was read lies in the machine's memory, which a year of samples may not.
 
-Run: ``python benchmarks/historian_case.py --days 4 --out results/historian --publish``; some minutes.
+Run: ``python benchmarks/historian_case.py --days 4 --out results/historian``; some minutes.
 """
 
 from __future__ import annotations
@@ -80,7 +80,6 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("results/historian"))
     parser.add_argument("--days", type=int, default=4)
-    parser.add_argument("--publish", action="store_true")
     arguments = parser.parse_args()
     building, rows = pilot_building(1), []
     end = START + pd.Timedelta(days=arguments.days)
@@ -104,7 +103,7 @@ def main() -> None:
     heads = ["days", "points", "samples", "read [s]", "of it our CPU [s]", "million samples a second",
              "a year at that rate [s]", "checked and saved [s]", "most memory [GB]"]  # fmt: skip
     table = f"{arguments.days} days.\n\n{markdown(heads, rows)}"
-    write(arguments.out, "historian_case", table, {"days": arguments.days, "rows": rows}, arguments.publish)
+    write(arguments.out, "historian_case", table, {"days": arguments.days, "rows": rows}, False)
     print(table)
 
 
