@@ -3,7 +3,8 @@
 Names are generated (`_network_names.py`): short names of control contractors, words of integrators under the device's
 name, and opaque objects with a description and sometimes without a unit; one point in seven or eight is none of the
 library's. The three habits and the library's abbreviations were written by the same people: real sites differ more
-between each other than these do. `SURE` was chosen on seeds 0 to 9; take others to confirm.
+between each other than these do. Three abbreviations
+(disch, sup, rht) were added after a look at seeds 0 to 3, which hold the same words as all others.
 
 Run: ``python benchmarks/discovery.py --seeds 10-29 --out results/discovery``; some ten seconds.
 Writes ``discovery.json`` and ``.md``.

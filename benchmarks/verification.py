@@ -1,7 +1,7 @@
 """Intervals of savings: how often they hold the saving that is known, how wide they are, and what our plant saves.
 
 First table: synthetic days (`_metered_days.py`: heating, weekends, noise of 8 % with a memory), a saving of 10 % of the
-mean power, 200 seeds a row, intervals at 90 %. Alternate days in four patterns, without and with heat that a day leaves
+mean power, a repeat a seed, intervals at 90 %. Alternate days in four patterns, without and with heat that a day leaves
 to the next (3 %), and a baseline before and after, beside the uncertainty of ASHRAE Guideline 14. Second table: an
 office of ours where supply air 1.5 K warmer acts on alternate days, beside two runs of all days with either control,
 whose difference is the true saving.

@@ -57,7 +57,7 @@ def case_pack(
     schema: Schema = "buildingmpc",
     json: options.Json = False,
 ) -> int:
-    """Pack a historian's days, so that cases are read some seven times as fast; the samples stay.
+    """Pack a historian's days, so that cases are read several times as fast; the samples stay.
 
     Example: buildingmpc case pack postgresql://me@localhost/site
     """

@@ -24,8 +24,8 @@ _OCCUPANCY, _SERVICE = 0.05, 0.5
 #: Level of tests of changes [-]: of two that are sound one in ten is told as changed.
 _LEVEL = 0.05
 
-#: Runs of each control below which intervals are too short: with two, 90 % intervals held the truth in 79 to 87 % of
-#: `benchmarks/verification.py`.
+#: Runs of each control below which intervals are too short: with two, 90 % intervals held the truth in 80 % of 40
+#: repeats (`benchmarks/verification.py`).
 _FEWEST_RUNS = 4
 
 #: Fractional savings uncertainty that ASHRAE Guideline 14 allows at 68 % [-].

@@ -160,7 +160,7 @@ def historian_telemetry(
 
 
 def pack_days(address: str, before: pd.Timestamp, schema: str = SCHEMA) -> int:
-    """Pack whole days of samples, so that they are read some seven times as fast; the samples stay.
+    """Pack whole days of samples, so that they are read several times as fast; the samples stay.
 
     Parameters
     ----------
