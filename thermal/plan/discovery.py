@@ -17,8 +17,8 @@ from thermal.plan.guard import checked_file, first_fault, reading, vocabulary
 from thermal.plan.match import EntityNames, PointMatch, read_matches, settled
 from thermal.units import check_unit
 
-#: Confidence from which a match is not called doubtful [-]: set beforehand at the middle between a match that is offered
-#: and a sure one; of the generated names of `benchmarks/discovery.py` none above it was wrong.
+#: Confidence from which a match is not called doubtful [-]: set beforehand, half way from one that is offered to a sure
+#: one; of the generated names of `benchmarks/discovery.py` none above it was wrong.
 SURE = 0.75
 
 _UNITS = vocabulary("bacnet_units")
