@@ -27,6 +27,10 @@ class ControlError(MpcError):
     """A control problem whose parts do not fit, or data of a horizon that are incomplete."""
 
 
+class VerificationError(MpcError):
+    """Metered energy that does not tell what was saved: columns, days or designs that do not fit."""
+
+
 class BoptestError(PlantError):
     """A BOPTEST server or client is used wrongly, or cannot be started."""
 

@@ -15,7 +15,9 @@ from typing import Annotated, Any, ParamSpec
 import typer
 
 from mpc.cli.calibrate import calibrate, diagnose
+from mpc.cli.case import case_from, case_pack
 from mpc.cli.control import compare, control, demo
+from mpc.cli.discover import discover
 from mpc.cli.doctor import doctor
 from mpc.cli.effects import effects
 from mpc.cli.evaluate import check, evaluate, simulate
@@ -25,6 +27,7 @@ from mpc.cli.imports import import_devices, import_plan, import_telemetry
 from mpc.cli.monitor import monitor
 from mpc.cli.options import displaying, switch, value
 from mpc.cli.serve import label, serve
+from mpc.cli.verify import verify
 from mpc.plugins import load_plugins
 from thermal.errors import Described
 
@@ -114,13 +117,20 @@ def _report(error: Exception, command: str, json: bool) -> int:
     return code
 
 
-_REPORTING = (demo, check, simulate, evaluate, calibrate, diagnose, experiment, monitor, identify, control, compare)
+_REPORTING = (
+    demo, check, simulate, evaluate, calibrate, diagnose, experiment, monitor, identify, control, compare, verify,
+)  # fmt: skip
 
 for _command in (
-    *(demo, doctor, check, import_plan, import_devices, import_telemetry, label),
-    *(simulate, evaluate, calibrate, diagnose, experiment, monitor, effects, identify, control, compare, serve),
+    *(demo, doctor, check, import_plan, import_devices, import_telemetry, discover, label),
+    *(simulate, evaluate, calibrate, diagnose, experiment, monitor, effects, identify, control, compare, verify, serve),
 ):
     app.command()(_guarded(displaying(_command) if _command in _REPORTING else _command))
+
+_cases = typer.Typer(no_args_is_help=True, help="Cases out of a historian.")
+for _name, _command in (("from", case_from), ("pack", case_pack)):
+    _cases.command(_name)(_guarded(_command))
+app.add_typer(_cases, name="case")
 
 
 def main() -> None:

@@ -14,6 +14,7 @@ from mpc.cli.options import Force, Json, file, value
 from thermal.errors import PlanError
 
 if TYPE_CHECKING:
+    from thermal.intake.telemetry import TelemetryImport
     from thermal.plan.assemble import PlanImport
     from thermal.plan.devices import DeviceImport
     from thermal.plan.match import PointMatch
@@ -103,7 +104,7 @@ def import_telemetry(
         str, typer.Argument(metavar="SOURCE", help="Parquet, CSV, Excel or postgresql://; columns of any names.")
     ],
     out: Annotated[Path, typer.Option(metavar="DIR", help="Case folder to make, with this telemetry.")],
-    points: Annotated[Path | None, file("points.csv, corrected by hand; default: matched by name.")] = None,
+    points: Annotated[Path | None, file("points.csv or proposal.yaml; default: by name.")] = None,
     unit: Annotated[
         list[str] | None, value("Unit in the table, repeatable; of energy for counters.", "POINT=UNIT")
     ] = None,
@@ -118,20 +119,42 @@ def import_telemetry(
     Example: buildingmpc import-telemetry cases/office export.csv --tz Europe/Berlin --resample 15min
     --out cases/office-3
     """
-    from mpc.reports.page import counted
     from thermal.case.case import Case
     from thermal.case.load import load_building
     from thermal.intake.stamps import checked_zone
     from thermal.intake.telemetry import ImportSettings
     from thermal.intake.telemetry import import_telemetry as read
+    from thermal.plan.discovery import read_points
     from thermal.plan.folder import save_with_labels
-    from thermal.plan.match import read_matches, write_matches
 
     building = load_building(case)
-    settings = ImportSettings(table, checked_zone(tz, "--tz"), _seconds(resample), _units(unit or ()))
-    found = read(building, source, settings, read_matches(points) if points is not None else None)
+    settings = ImportSettings(table, checked_zone(tz, "--tz"), seconds_of(resample, "--resample"), _units(unit or ()))
+    found = read(building, source, settings, read_points(points, building) if points is not None else None)
     new = Case(building, found.telemetry)
     folder = save_with_labels(new, case.parent if case.is_file() else case, out, overwrite=force)
+    return telemetry_answer(found, folder, json)
+
+
+def telemetry_answer(found: TelemetryImport, folder: Path, json: bool) -> int:
+    """Write what became of the columns beside a new case, and say it.
+
+    Parameters
+    ----------
+    found : TelemetryImport
+        In the case.
+    folder : Path
+        Of the case.
+    json : bool
+        Whether JSON is asked for.
+
+    Returns
+    -------
+    int
+        Exit code: 0.
+    """
+    from mpc.reports.page import counted
+    from thermal.plan.match import write_matches
+
     write_matches(found.matches, folder / "points.csv")
     if len(found.aside):
         found.aside.to_parquet(folder / "unmatched.parquet", index=False)
@@ -143,20 +166,36 @@ def import_telemetry(
         _show_matches(found.matches)
         for remark in (*found.remarks, *((lost,) if found.unmatched_heat else ())):
             say(f"- {remark}")
-        say(f"{frame.shape[1]} columns from {first:%Y-%m-%d %H:%M} to {last:%Y-%m-%d %H:%M}, every {new.step:g} s")
+        say(
+            f"{frame.shape[1]} columns from {first:%Y-%m-%d %H:%M} to {last:%Y-%m-%d %H:%M}, "
+            f"every {found.telemetry.step:g} s"
+        )
         if len(found.aside):
             say(f"Kept aside: {folder / 'unmatched.parquet'}, {counted(found.aside['column'].nunique(), 'column')}")
         say(f"Case: {folder}   Points: {folder / 'points.csv'}")
         say(f"Next: buildingmpc check {folder}")
 
-    content = {"start": first.isoformat(), "end": last.isoformat(), "step_seconds": new.step}
+    content = {"start": first.isoformat(), "end": last.isoformat(), "step_seconds": found.telemetry.step}
     content |= {"columns": frame.shape[1], "points": [asdict(m) for m in found.matches]}
     content |= {"remarks": list(found.remarks), "unmatched_heat": list(found.unmatched_heat)}
     return answer(json, content, show)
 
 
-def _seconds(text: str) -> float | None:
-    """Length of a step [s], such as 5min or 1h; None for none."""
+def seconds_of(text: str, where: str) -> float | None:
+    """Read the length of a step, such as 5min or 1h [s]; None for none.
+
+    Parameters
+    ----------
+    text : str
+        As it was given.
+    where : str
+        Name of the option.
+
+    Raises
+    ------
+    PlanError
+        When it is no length of time.
+    """
     from pandas import Timedelta
 
     from thermal.errors import PlanError
@@ -166,7 +205,7 @@ def _seconds(text: str) -> float | None:
     try:
         return float(Timedelta(text).total_seconds())
     except ValueError as error:
-        raise PlanError("--resample", "a time such as 5min or 1h", repr(text)) from error
+        raise PlanError(where, "a time such as 5min or 1h", repr(text)) from error
 
 
 def _units(given: Sequence[str]) -> dict[str, str]:

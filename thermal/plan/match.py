@@ -2,7 +2,7 @@
 
 import csv
 import difflib
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
@@ -93,11 +93,19 @@ def match_points(
     >>> found.entity, found.point, round(found.confidence, 2)
     ('VAV_1', 'zone_air_temperature_sensor', 0.89)
     """
-    entities = {device.name: device.type for device in devices} | dict.fromkeys(zones, "zone")
-    entities[weather_station] = "weather"
-    keys = {name: key(name) for name in entities}
+    names = EntityNames.of(devices, zones, weather_station)
     known = {p.column: PointMatch(p.column, p.entity, p.point, 1.0) for p in listed if p.point}
-    guesses = [known.get(column) or _guess(column, entities, keys, weather_station) for column in columns]
+    return settled([known.get(column) or names.guess(column) for column in columns])
+
+
+def settled(guesses: Sequence[PointMatch]) -> tuple[PointMatch, ...]:
+    """Give each point to the most confident of the columns that could be it; the others get a remark.
+
+    Parameters
+    ----------
+    guesses : sequence of PointMatch
+        One a column.
+    """
     best: dict[tuple[str, str], PointMatch] = {}
     for guess in guesses:
         place = (guess.entity, guess.point)
@@ -118,10 +126,64 @@ def _remark(guess: PointMatch, best: dict[tuple[str, str], PointMatch]) -> str:
     return "" if taken is guess else f"{taken.column!r} fits as well or better"
 
 
-def _guess(column: str, entities: dict[str, str], keys: dict[str, tuple[str, ...]], weather_station: str) -> PointMatch:
-    head, _, tail = column.rpartition("/")
-    if head in entities and tail in POINT_TYPES:
-        return PointMatch(column, head, tail, 1.0)
+@dataclass(frozen=True)
+class EntityNames:
+    """What columns may be of.
+
+    Parameters
+    ----------
+    types : dict of str to str
+        Type of a device, ``zone`` or ``weather``, by name.
+    keys : dict of str to tuple of str
+        Words of the names.
+    weather_station : str
+        Name of the weather station.
+    """
+
+    types: dict[str, str]
+    keys: dict[str, tuple[str, ...]]
+    weather_station: str
+
+    @classmethod
+    def of(cls, devices: Sequence[Device], zones: Sequence[str], weather_station: str) -> "EntityNames":
+        """Names of a building.
+
+        Parameters
+        ----------
+        devices : sequence of Device
+            Of the building.
+        zones : sequence of str
+            Of the building.
+        weather_station : str
+            Name of the weather station.
+        """
+        types = {device.name: device.type for device in devices} | dict.fromkeys(zones, "zone")
+        types[weather_station] = "weather"
+        return cls(types, {name: key(name) for name in types}, weather_station)
+
+    def guess(self, column: str, possible: Collection[str] = tuple(POINT_TYPES)) -> PointMatch:
+        """Guess what a column is, as far as its name tells.
+
+        Parameters
+        ----------
+        column : str
+            Its name.
+        possible : collection of str
+            Point types that it can be.
+        """
+        head, _, tail = column.rpartition("/")
+        if head in self.types and tail in possible:
+            return PointMatch(column, head, tail, 1.0)
+        return _guess(column, self.types, self.keys, self.weather_station, possible)
+
+
+def _guess(
+    column: str,
+    entities: dict[str, str],
+    keys: dict[str, tuple[str, ...]],
+    weather_station: str,
+    possible: Collection[str],
+) -> PointMatch:
     words = key(column)
     found = [
         (len(name_key), name, i)
@@ -137,11 +199,11 @@ def _guess(column: str, entities: dict[str, str], keys: dict[str, tuple[str, ...
     else:
         name, certain, rest = _alike(words, keys)
     if not name:
-        point, share = _point(list(words), "weather")
+        point, share = _point(list(words), "weather", possible)
         if point in _OF_WEATHER and share > 0.0:
             return PointMatch(column, weather_station, point, 0.8 * share)
         return PointMatch(column, "", "", 0.0)
-    point, share = _point(rest, entities[name])
+    point, share = _point(rest, entities[name], possible)
     return PointMatch(column, name, point, certain * share)
 
 
@@ -163,18 +225,18 @@ def _alike(words: Sequence[str], keys: dict[str, tuple[str, ...]]) -> tuple[str,
     return best
 
 
-def _point(words: Sequence[str], kind: str) -> tuple[str, float]:
+def _point(words: Sequence[str], kind: str, possible: Collection[str]) -> tuple[str, float]:
     """Point type whose words are most like those of a name, and how much they are."""
     meant = {part for word in words for part in _SHORT.get(word, word).split()}
     if kind in _TERMINALS and {"supply", "temperature"} <= meant and "setpoint" not in meant:
         meant = meant - {"supply"} | {"discharge"}
     if kind in _TERMINALS and {"heating", "valve"} <= meant:
         meant |= {"water"}
-    if not meant:
+    if not meant or not possible:
         return "", 0.0
     if kind == "zone":
         meant |= {"zone"}  # of a room's temperature nobody says that it is the room's
-    names = {point: {*words_of(point)} for point in POINT_TYPES}
+    names = {point: {*words_of(point)} for point in possible}
     ratios = {p: 2.0 * _weight(meant & words) / (_weight(meant) + _weight(words)) for p, words in names.items()}
     best = max(ratios, key=lambda point: ratios[point])
     return (best, ratios[best]) if ratios[best] > 0.0 else ("", 0.0)

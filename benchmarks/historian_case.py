@@ -1,0 +1,111 @@
+"""A historian of 890 points at one minute, read as a case: how fast, plain and packed, and how much memory.
+
+A PostgreSQL server of its own is filled with some days of the pilot building's points, as live operation's tables have
+them. The case is made as `buildingmpc case from` makes it, at steps of 5 minutes. A year is so many days at the same
+rate; what was read lies in the machine's memory, which a year of samples may not.
+
+Run: ``python benchmarks/historian_case.py --days 4 --out results/historian``; some minutes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import shutil
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pandas as pd
+from _table import markdown, write
+
+from thermal import Building, Case, save_case
+from thermal.intake.historian import historian_telemetry, pack_days
+from thermal.pilot.building import pilot_building
+
+START, STEP, POINTS = pd.Timestamp("2026-01-01", tz="UTC"), 300.0, 890
+
+_OF_DEVICE = ("zone_air_temperature_sensor", "supply_air_flowrate_sensor", "discharge_air_temperature_sensor",
+              "supply_air_damper_percentage_command", "heating_water_valve_percentage_command",
+              "zone_air_heating_temperature_setpoint", "zone_air_cooling_temperature_setpoint",
+              "heating_power_sensor")  # fmt: skip
+
+_TABLES = """
+CREATE SCHEMA buildingmpc;
+SET search_path = buildingmpc;
+CREATE TABLE point (id integer GENERATED ALWAYS AS IDENTITY PRIMARY KEY, name text NOT NULL UNIQUE, unit text);
+CREATE TABLE sample (point integer NOT NULL REFERENCES point (id), time timestamptz NOT NULL,
+                     value double precision NOT NULL, PRIMARY KEY (point, time));
+"""
+
+
+@contextmanager
+def postgres(folder: Path) -> Iterator[str]:
+    """Run a server of Debian's PostgreSQL on a socket in a folder, as the user postgres where this one is root."""
+    binaries = sorted(Path("/usr/lib/postgresql").glob("*/bin"))[-1]
+    shutil.chown(folder, "postgres")
+    as_user = ["runuser", "-u", "postgres", "--"]
+    run = [*as_user, str(binaries / "initdb"), "-D", str(folder / "data"), "-U", "tester", "-A", "trust", "--no-sync"]
+    subprocess.run(run, check=True, capture_output=True)
+    options = f"-k {folder} -c listen_addresses='' -c fsync=off -c shared_buffers=512MB -c max_wal_size=8GB"
+    control = [*as_user, str(binaries / "pg_ctl"), "-D", str(folder / "data"), "-w", "-l", str(folder / "log")]
+    subprocess.run([*control, "-o", options, "start"], check=True, capture_output=True)
+    try:
+        yield f"postgresql://tester@/postgres?host={folder}"
+    finally:
+        subprocess.run([*control, "-m", "immediate", "stop"], check=True, capture_output=True)
+
+
+def fill(address: str, building: Building, days: int) -> None:
+    """Write a sample a minute of every point, in the order of time."""
+    import psycopg
+
+    names = [f"{d.name}/{p}" for d in building.devices if d.zone for p in _OF_DEVICE][:POINTS]
+    with psycopg.connect(address, autocommit=True) as connection:
+        connection.execute(_TABLES)
+        connection.execute("INSERT INTO point (name) SELECT unnest(%s::text[])", [names])
+        connection.execute(
+            "INSERT INTO sample SELECT id, t, 0.5 + 0.4 * sin(extract(epoch FROM t) / 9000 + id) FROM "
+            "generate_series(%s + interval '1 minute', %s, interval '1 minute') t, point",
+            [START, START + pd.Timedelta(days=days)],
+        )
+        connection.execute("VACUUM ANALYZE sample")
+
+
+def main() -> None:
+    """Make the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=Path("results/historian"))
+    parser.add_argument("--days", type=int, default=4)
+    arguments = parser.parse_args()
+    building, rows = pilot_building(1), []
+    end = START + pd.Timedelta(days=arguments.days)
+    with tempfile.TemporaryDirectory() as work:
+        Path(work).chmod(0o755)
+        with postgres(Path(tempfile.mkdtemp(dir=work))) as address:
+            fill(address, building, arguments.days)
+            for kind in ("as they come", "packed"):
+                if kind == "packed":
+                    pack_days(address, end)
+                wall, used = time.perf_counter(), time.process_time()
+                found = historian_telemetry(building, address, (START, end), STEP)
+                read, cpu = time.perf_counter() - wall, time.process_time() - used
+                wall = time.perf_counter()
+                save_case(Case(building, found.telemetry), Path(work) / kind)
+                saved = time.perf_counter() - wall
+                samples = found.telemetry.frame.shape[1] * 1440 * arguments.days
+                memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+                rows.append([kind, found.telemetry.frame.shape[1], samples, read, cpu, samples / read / 1e6,
+                             read / arguments.days * 365, saved, memory])  # fmt: skip
+    heads = ["days", "points", "samples", "read [s]", "of it our CPU [s]", "million samples a second",
+             "a year at that rate [s]", "checked and saved [s]", "most memory [GB]"]  # fmt: skip
+    table = f"{arguments.days} days.\n\n{markdown(heads, rows)}"
+    write(arguments.out, "historian_case", table, {"days": arguments.days, "rows": rows}, False)
+    print(table)
+
+
+if __name__ == "__main__":
+    main()
