@@ -114,13 +114,14 @@ def _loads(telemetry: PlantTelemetry, machines: Sequence[Machine], data: GreyBox
 
 
 def _above(telemetry: PlantTelemetry, machines: Sequence[Machine]) -> FloatArray:
-    """How far setpoints lie above the air of their zones, shape (n_time, n_machine) [K]."""
+    """How far setpoints lie above the air of their zones at the ends of the steps, shape (n_time, n_machine) [K]."""
     columns = []
     for machine in machines:
         set_to = telemetry.frame.get(f"{SET}{machine.name}")
         measured = telemetry.frame.get(machine.name)
         value = set_to if set_to is not None and set_to.notna().any() else measured
-        zone = telemetry.frame[f"{machine.serves[0]}/{ZONE_TEMPERATURE}"]
+        mean = telemetry.frame[f"{machine.serves[0]}/{ZONE_TEMPERATURE}"]
+        zone = 0.5 * (mean + mean.shift(-1))
         if machine.role == "setpoint" and value is not None:
             columns.append((value - zone).to_numpy(dtype=float))
         else:

@@ -74,7 +74,7 @@ class Machine:
         """Load as a share of full load, shape (n_time,) [-]; NaN while nothing says it.
 
         That of a machine is its command. Where none was recorded, and of setpoints, it is the share of the heat of full
-        load, the 98th percentile of what was seen.
+        load, the 98th percentile of what was seen; a setpoint's may be more than 1.
 
         Parameters
         ----------
@@ -85,7 +85,8 @@ class Machine:
         told = telemetry.frame.get(f"{SET}{self.name}")
         if self.role == "machine" and told is not None and told.notna().any():
             return np.asarray((told.to_numpy(dtype=float) - low) / (high - low))
-        return np.clip(self.signal(telemetry) / self.full(telemetry), 0.0, 1.0)
+        most = 1.0 if self.role == "machine" else np.inf
+        return np.clip(self.signal(telemetry) / self.full(telemetry), 0.0, most)
 
     def full(self, telemetry: PlantTelemetry) -> float:
         """Heat of full load [W].

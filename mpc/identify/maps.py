@@ -9,6 +9,7 @@ from typing import Any, Literal, Self
 import numpy as np
 
 from mpc.errors import PlantError
+from mpc.identify.limits import OUT_OF_REACH, bin_of
 from mpc.identify.machines import Machine
 from thermal._types import BoolArray, FloatArray
 
@@ -104,6 +105,8 @@ class MachineMap:
         Of each kind that is bought [W].
     above : tuple of float
         Of a setpoint: how far it lies above the zone's air at no load and at full load [K].
+    limits : tuple of tuple of float
+        Of a setpoint: outdoor air [K] and load [-] of steps at which no more heat was to be had.
     """
 
     machine: Machine
@@ -111,6 +114,7 @@ class MachineMap:
     heat: Curve
     powers: Mapping[str, Curve]
     above: tuple[float, float] = (0.0, 0.0)
+    limits: tuple[tuple[float, float], ...] = ()
 
     def at(self, curve: Curve, u: Any, outdoor: Any, emitter: Any) -> Any:
         """Evaluate at a duty or load, for a controller: duty is a share of the time at full load [W].
@@ -272,7 +276,8 @@ def map_machines(
         if machine.role == "machine":
             made.append(replace(found, operation=_operation(found)))
         else:
-            made.append(replace(found, above=_local(loads.level[:, m], above[:, m])))
+            level = loads.level[:, m]
+            made.append(replace(found, above=_local(level, above[:, m]), limits=_limits(loads.outdoor, level, above[:, m])))
     return tuple(made), {kind: base for kind, (_, base) in powers.items()}
 
 
@@ -291,6 +296,16 @@ def _local(level: FloatArray, above: FloatArray) -> tuple[float, float]:
         return 0.0, 1.0
     slope, zero = np.polyfit(level[between], above[between], 1)
     return float(zero), float(zero + max(slope, 0.0))
+
+
+def _limits(outdoor: FloatArray, level: FloatArray, above: FloatArray) -> tuple[tuple[float, float], ...]:
+    """Outdoor air and load of the steps at which a setpoint was out of reach, or the load full; the most of each bin."""
+    found: dict[int, tuple[float, float]] = {}
+    for k in np.flatnonzero((above > OUT_OF_REACH) & (level > _SAME) | (level >= 1.0)):
+        known = found.get(bin_of(outdoor[k]))
+        if known is None or level[k] > known[1]:
+            found[bin_of(outdoor[k])] = (float(outdoor[k]), float(level[k]))
+    return tuple(sorted(found.values()))
 
 
 def interval_of(curve: Curve, feature: str) -> tuple[float, float]:

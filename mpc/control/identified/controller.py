@@ -14,6 +14,7 @@ from calibration.estimation.state_space import REFERENCE
 from mpc.control.identified.conformal import ConformalBackOff, Guarantee
 from mpc.control.identified.observer import GreyBoxObserver
 from mpc.control.identified.problem import SCALE, Ahead, IdentifiedProblem
+from mpc.control.identified.thermostats import Thermostats
 from mpc.control.solvers.solution import Status
 from mpc.control.solvers.stages import StageSolution, StageSolver
 from mpc.errors import ControlError
@@ -28,8 +29,8 @@ from thermal.case.building import Location
 #: Share of a day's starts that may be used at once [-].
 _AT_ONCE = 1.0 / 3.0
 
-#: A duty above this is a run, a load below the other one is none [-].
-_HALF, _IDLE = 0.5, 0.02
+#: A duty above this is a run [-].
+_HALF = 0.5
 
 
 @dataclass(frozen=True)
@@ -143,6 +144,7 @@ class IdentifiedController:
         self._plan: StageSolution | None = None
         self._most = max(_AT_ONCE * self.settings.starts, 1.0)
         self._runs = [_Runs(self._most) for _ in model.maps]
+        self._thermostats = Thermostats(model)
         self._hold = max(round(self.settings.run / model.step), 1)
         self._back = max(self.settings.starts - self._most, 0.0) * model.step / 86_400.0
         asked = self.settings.guarantee
@@ -198,6 +200,7 @@ class IdentifiedController:
             self._observer.start(measurements, float(ahead.outdoor[0]))
             return
         before, levels = self._before
+        self._thermostats.learn(measurements, self._observer.zones(measurements), float(before.outdoor[0]))
         self._observer.update(measurements, before, levels)
         if self.conformal is not None:
             realised = self._inside(self._observer.zones(measurements) - REFERENCE, before)
@@ -213,7 +216,7 @@ class IdentifiedController:
     def _decided(self, ahead: Ahead) -> StageSolution | None:
         """Plan, with the first steps of machines in duty whole."""
         count, m = len(ahead.outdoor), len(self.model.maps)
-        low, high = np.zeros((count, m)), np.ones((count, m))
+        low, high = np.zeros((count, m)), self._thermostats.most(ahead.outdoor)
         best: StageSolution | None = None
         whole = [k for k, found in enumerate(self.model.maps) if found.operation == "duty"]
         for k in whole:
@@ -294,23 +297,29 @@ class IdentifiedController:
 
     def _values(self, levels: FloatArray, solution: StageSolution | None, ahead: Ahead) -> dict[str, float]:
         """Values of the actuators for levels."""
-        zone = self._observer.state if solution is None else 0.5 * (solution.states[0] + solution.states[1])
-        return {
-            found.machine.name: self._value(found, float(level), zone, ahead)
-            for found, level in zip(self.model.maps, levels, strict=True)
-        }
+        count = len(self.model.box.zones)
+        end = (self._observer.state if solution is None else solution.states[1])[:count] + REFERENCE
+        most, values = self._thermostats.most(ahead.outdoor[:1])[0], dict[str, float]()
+        for k, found in enumerate(self.model.maps):
+            level = float(levels[k])
+            if found.operation == "setpoint":
+                actuator = self._actuators[found.machine.name]
+                told = self._thermostats.tell(k, level, most[k], end, self._edge(found, ahead))
+                value = float(np.clip(told, actuator.lowest, actuator.highest))
+            else:
+                value = self._command(found, level)
+            values[found.machine.name] = value
+        return values
 
-    def _value(self, found: MachineMap, level: float, zone: FloatArray, ahead: Ahead) -> float:
-        """Value of an actuator for a level: a setpoint follows the expected air of its zone."""
+    def _edge(self, found: MachineMap, ahead: Ahead) -> float:
+        """Lower edge of the band of the zones of a machine, and what is kept from it [K]."""
+        served = [k for k, name in enumerate(self.model.box.zones) if name in found.machine.serves]
+        return float(ahead.lower[0, served].max()) + max(self.back_off, 0.0)
+
+    def _command(self, found: MachineMap, level: float) -> float:
+        """Value of a machine's actuator for a level."""
         actuator = self._actuators[found.machine.name]
         low, high = actuator.lowest, actuator.highest
-        if found.operation == "setpoint":
-            served = [k for k, name in enumerate(self.model.box.zones) if name in found.machine.serves]
-            idle, full = found.above
-            value = float(zone[served].mean()) + REFERENCE + idle + level * (full - idle)
-            # a thermostat holds what it is told: told the edge it keeps the band where the model is wrong
-            edge = float(ahead.lower[0, served].max()) + max(self.back_off, 0.0)
-            return float(np.clip(edge if level <= _IDLE else max(value, edge), low, high))
         if found.operation == "duty":
             return high if level > _HALF else low
         value = low + level * (high - low)
