@@ -86,6 +86,7 @@ def features_of(on: Any, u: Any, outdoor: Any, emitter: Any) -> dict[str, Any]:
         "command^2": u * u,
         "outdoor": u * (outdoor - OUTDOOR) / PER,
         "emitter": u * (emitter - EMITTER) / PER,
+        "command^2 outdoor": u * u * (outdoor - OUTDOOR) / PER,
     }
 
 
@@ -192,6 +193,7 @@ class Loads:
             "command^2": len(levels) < 3,
             "outdoor": running.sum() < 8 or np.std(outdoor[running]) < _TOLD,
             "emitter": running.sum() < 8 or np.std(emitter[running]) < _TOLD,
+            "command^2 outdoor": len(levels) < 3 or np.std(outdoor[running]) < _TOLD,
         }
         return {name: values for name, values in found.items() if not left_out.get(name, False)}
 

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from calibration.estimation.state_space import REFERENCE
-from mpc.control.identified.conformal import ConformalBackOff, Guarantee
+from mpc.control.identified.conformal import AFTER, ConformalBackOff, Guarantee, risen
 from mpc.control.identified.observer import GreyBoxObserver
 from mpc.control.identified.problem import SCALE, Ahead, IdentifiedProblem
 from mpc.control.identified.thermostats import Thermostats
@@ -43,7 +43,7 @@ class IdentifiedSettings:
         Of a zone's kelvin outside of its band for an hour [currency/K/h]: some hundred times what a kelvin less saves
         a house in an hour, so that bands are left only where they cannot be kept.
     back_off : float
-        Distance that is kept from the edges of the bands [K]; where a guarantee is asked for, that of its start.
+        Distance that is kept from the lower edges of the bands [K]; where a guarantee is asked for, that of its start.
     start_price : float
         Of a start of a machine [currency]: a compressor of 5,000 that bears 100,000 starts.
     starts : int
@@ -148,13 +148,16 @@ class IdentifiedController:
         self._hold = max(round(self.settings.run / model.step), 1)
         self._back = max(self.settings.starts - self._most, 0.0) * model.step / 86_400.0
         asked = self.settings.guarantee
-        self.conformal = None if asked is None else ConformalBackOff(asked, self.settings.back_off)
+        self.conformal = None if asked is None else ConformalBackOff(asked, len(model.box.zones), self.settings.back_off)
+        self._edges: FloatArray = np.empty((0, len(model.box.zones)))
+        self._kept: FloatArray = np.empty((0, len(model.box.zones)))
         self.back_offs: list[float] = []
 
-    @property
-    def back_off(self) -> float:
-        """Distance that is kept from the bands now [K]."""
-        return self.settings.back_off if self.conformal is None else self.conformal.value
+    def _back_off(self, ahead: Ahead) -> FloatArray:
+        """Distance that is kept from the lower edges, shape (N, n_zone) [K]."""
+        if self.conformal is None:
+            return np.full(ahead.lower.shape, self.settings.back_off)
+        return self.conformal.along(risen(ahead.lower, self.model.step, self._edges))
 
     def step(self, measurements: Measurements, forecast: Forecast | None) -> PlannedAction:
         """Choose values of the actuators.
@@ -178,7 +181,8 @@ class IdentifiedController:
         self._observe(measurements, ahead)
         if self._solver is None or self._solver.n_steps != len(ahead.outdoor):
             self._solver, self._plan = StageSolver(self._problem.stage, len(ahead.outdoor), tolerance=1e-6), None
-        self.back_offs.append(self.back_off)
+        self._kept = self._back_off(ahead)
+        self.back_offs.append(float(self._kept[0].mean()))
         solution = self._decided(ahead)
         levels = solution.decisions[0] if solution is not None else self._by_rule(measurements, ahead)
         source = "optimal plan" if solution is not None else "rules"
@@ -204,7 +208,11 @@ class IdentifiedController:
         self._observer.update(measurements, before, levels)
         if self.conformal is not None:
             realised = self._inside(self._observer.zones(measurements) - REFERENCE, before)
-            self.conformal.update(realised, before.occupied[0])
+            self.conformal.update(
+                realised, before.occupied[0], risen(before.lower[:1], self.model.step, self._edges)[0]
+            )
+        count = max(round(AFTER / self.model.step), 1)
+        self._edges = np.vstack([self._edges, before.lower[:1]])[-count:]
 
     def _inside(self, zone: FloatArray, ahead: Ahead) -> FloatArray:
         """Distance from the lower edge of the band of the first step, positive inside, shape (n_zone,) [K].
@@ -268,7 +276,7 @@ class IdentifiedController:
         state, solver = self._observer.state, self._solver
         if solver is None:
             return None
-        data = self._problem.data(state, ahead, self.back_off, self.settings.comfort_price, ends)
+        data = self._problem.data(state, ahead, self._kept, self.settings.comfort_price, ends)
         guess = np.full((len(ahead.outdoor), len(self.model.maps)), _HALF)
         if self._plan is not None:
             guess = self._plan.shifted()[1]
@@ -282,7 +290,7 @@ class IdentifiedController:
         """Levels without a plan: full where a zone is too cold, else none."""
         inside = self._inside(self._observer.zones(measurements) - REFERENCE, ahead)
         served = [[zone in found.machine.serves for zone in self.model.box.zones] for found in self.model.maps]
-        return np.array([float((inside[np.array(mine)] < self.back_off).any()) for mine in served])
+        return np.array([float((inside < self._kept[0])[np.array(mine)].any()) for mine in served])
 
     def _note(self, levels: FloatArray) -> None:
         """Write down which machines run."""
@@ -314,7 +322,7 @@ class IdentifiedController:
     def _edge(self, found: MachineMap, ahead: Ahead) -> float:
         """Lower edge of the band of the zones of a machine, and what is kept from it [K]."""
         served = [k for k, name in enumerate(self.model.box.zones) if name in found.machine.serves]
-        return float(ahead.lower[0, served].max()) + max(self.back_off, 0.0)
+        return float((ahead.lower[0] + self._kept[0])[served].max())
 
     def _command(self, found: MachineMap, level: float) -> float:
         """Value of a machine's actuator for a level."""
