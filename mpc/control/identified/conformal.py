@@ -9,6 +9,10 @@ import numpy as np
 from mpc.errors import ControlError
 from thermal._types import BoolArray, FloatArray
 
+#: Share of violations [-]: on the plants to develop on, steps below the band then sum up to less than 0.5 K h in two
+#: weeks, as most of them miss it by some hundredths of a kelvin.
+SHARE = 0.01
+
 #: Range of the back-off [K]: a third of a usual band of 3 K inwards, half of what people hardly feel outwards.
 RANGE = (-0.5, 1.0)
 
@@ -38,7 +42,7 @@ class Guarantee:
         When the share is none, or the range is empty.
     """
 
-    share: float
+    share: float = SHARE
     lowest: float = RANGE[0]
     highest: float = RANGE[1]
 

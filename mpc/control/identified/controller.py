@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -50,8 +50,8 @@ class IdentifiedSettings:
         Most starts of a machine within 24 hours.
     run : float
         Shortest run and shortest rest of a machine [s].
-    guarantee : Guarantee, optional
-        Share of violations that is asked for.
+    guarantee : Guarantee or None
+        Share of violations that is kept; None keeps the back-off as it is.
     """
 
     comfort_price: float = 10.0
@@ -59,7 +59,7 @@ class IdentifiedSettings:
     start_price: float = 0.05
     starts: int = 10
     run: float = 1800.0
-    guarantee: Guarantee | None = None
+    guarantee: Guarantee | None = field(default_factory=Guarantee)
 
 
 @dataclass
