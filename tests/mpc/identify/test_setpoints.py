@@ -89,13 +89,13 @@ def test_a_limit_is_the_posterior_of_a_gaussian_process() -> None:
 
 def test_limits_are_read_from_the_steps_at_which_more_was_wanted() -> None:
     n = 60
-    level = np.full((n, 1), 0.6)
+    level = np.random.default_rng(0).uniform(0.1, 0.9, (n, 1))
     level[:3], level[3] = 0.3, 0.35  # as much as there is at -10 degC
-    outdoor = np.full(n, 280.0)
+    outdoor = np.random.default_rng(1).normal(280.0, 3.0, n)
     outdoor[:4] = 263.0
     above = np.full((n, 1), 0.0)
     above[:4] = 1.0
-    (found,), _ = map_machines([led().maps[0].machine], Loads(level, outdoor, np.full((n, 1), 300.0)),
+    (found,), _ = map_machines([led().maps[0].machine], Loads(level, outdoor, 300.0 + level**3),
                                5000.0 * level, {}, above)  # fmt: skip
     assert found.limits == ((263.0, 0.35),)
     assert found.heat.coefficients["command"] == pytest.approx(5000.0)
