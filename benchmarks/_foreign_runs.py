@@ -22,9 +22,10 @@ from mpc.control.identified.controller import IdentifiedSettings
 from mpc.identify.excitation import ExcitationSettings
 from mpc.identify.identify import identify
 from mpc.identify.model import FILE, PlantModel, read_model
+from mpc.identify.telemetry import run_recorded
 from mpc.kpi.kpis import measure_kpis
 from mpc.loop.plant import Controller, Measurements
-from mpc.loop.run import ClosedLoopRun, run_closed_loop
+from mpc.loop.run import ClosedLoopRun
 from mpc.scenario.forecast import Forecast
 from mpc.scenario.scenario import Scenario
 from mpc.studies.described import PlantStudy, experiment_period, run_experiment
@@ -88,8 +89,8 @@ def drive(
     study = PlantStudy(path, start=first, end=last, model=model, settings=settings or IdentifiedSettings())
     with study.plant() as plant:
         timed = Timed(CONTROLLERS[controller](study, plant))
-        loop = run_closed_loop(plant, timed, forecasts=True)
-        return loop, study.scenario(plant), timed, spent
+        loop, seen = run_recorded(plant, timed, study.site)
+        return loop, study.scenario(plant, seen), timed, spent
 
 
 def identified(name: str, out: Path) -> tuple[PlantModel, dict[str, Any]]:

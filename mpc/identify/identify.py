@@ -134,8 +134,8 @@ def _notes(telemetry: PlantTelemetry, machines: Sequence[Machine], suns: Sequenc
     for machine in machines:
         if not machine.heat:
             notes.append(f"no heat of {machine.name} is measured: it is counted in watts of what is bought at 7 degC")
-        told = telemetry.frame.get(f"{SET}{machine.name}")
-        if machine.role == "machine" and (told is None or told.isna().all()):
+        told = [telemetry.frame[c] for c in (f"{SET}{machine.name}", machine.name) if c in telemetry.frame]
+        if machine.role == "machine" and all(values.isna().all() for values in told):
             notes.append(f"no command of {machine.name} was recorded: its load is the share of the largest heat seen")
     if not suns:
         notes.append("no irradiance is known: the sun is part of the unmeasured heat")

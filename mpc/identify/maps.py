@@ -186,8 +186,8 @@ class Loads:
         rows = self.known
         u, emitter, outdoor = self.level[rows, m], self.emitter[rows, m], self.outdoor[rows]
         found = features_of((u > 1e-6).astype(float), u, outdoor, emitter)
-        levels = np.unique(np.round(u[u > 1e-6] / _SAME))
         running = u > 1e-6
+        levels = np.unique(np.round(u[running] / _SAME))
         left_out = {
             "standing": len(levels) < 2,
             "command^2": len(levels) < 3,
@@ -198,7 +198,9 @@ class Loads:
         return {name: values for name, values in found.items() if not left_out.get(name, False)}
 
 
-def regress(loads: Loads, values: FloatArray, machines: Sequence[int]) -> tuple[list[Curve], float]:
+def regress(
+    loads: Loads, values: FloatArray, machines: Sequence[int], *, base: bool = True
+) -> tuple[list[Curve], float]:
     """Regress what is measured on the features of machines, a constant beside them.
 
     Parameters
@@ -209,6 +211,9 @@ def regress(loads: Loads, values: FloatArray, machines: Sequence[int]) -> tuple[
         Measured [W].
     machines : sequence of int
         Which machines have a part in it.
+    base : bool
+        Whether something may be left when all machines are off; nothing tells that from the standing part of a machine
+        that never stops, which is then counted to it.
 
     Returns
     -------
@@ -225,11 +230,13 @@ def regress(loads: Loads, values: FloatArray, machines: Sequence[int]) -> tuple[
     from statsmodels.regression.linear_model import OLS
 
     rows = loads.known & np.isfinite(values)
-    columns, owners = [np.ones(int(rows.sum()))], [(-1, "constant")]
+    columns, owners = ([np.ones(int(rows.sum()))], [(-1, "constant")]) if base else ([], [])
     for m in machines:
         for name, feature in loads.features(m).items():
-            columns.append(feature[rows[loads.known]])
-            owners.append((m, name))
+            column = feature[rows[loads.known]]
+            if not (base and name == "standing" and column.all()):
+                columns.append(column)
+                owners.append((m, name))
     PlantError.unless(
         rows.sum() > 4 * len(columns), "component maps", f"{4 * len(columns)} steps with known commands", rows.sum(),
         "give more days, or telemetry whose commands are recorded",
@@ -241,7 +248,7 @@ def regress(loads: Loads, values: FloatArray, machines: Sequence[int]) -> tuple[
         for m in machines
     ]
     curves = [Curve({n: c for n, (c, _) in p.items()}, {n: d for n, (_, d) in p.items()}) for p in parts]
-    return curves, float(found.params[0])
+    return curves, float(found.params[0]) if base else 0.0
 
 
 def map_machines(
@@ -270,7 +277,8 @@ def map_machines(
         Power of each kind that no machine explains [W].
     """
     everyone = range(len(machines))
-    heats = [regress(loads, signals[:, m], [m])[0][0] for m in everyone]
+    stops = [bool((loads.level[:, m] <= 1e-6).any()) for m in everyone]
+    heats = [regress(loads, signals[:, m], [m], base=stops[m])[0][0] for m in everyone]
     powers = {kind: regress(loads, values, everyone) for kind, values in bought.items() if np.ptp(values) > 1.0}
     made = []
     for m, machine in enumerate(machines):
