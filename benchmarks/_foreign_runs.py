@@ -80,7 +80,7 @@ def run(name: str, which: str, controller: str, out: Path) -> dict[str, Any]:
 def drive(
     name: str, controller: str, out: Path, begin: pd.Timestamp, days: int, settings: IdentifiedSettings | None = None
 ) -> tuple[ClosedLoopRun, Scenario, Timed, dict[str, Any]]:
-    """Close the loop of a plant and a controller for some days: run, scenario, the timed controller, what a model took."""
+    """Close the loop for some days: the run, its scenario, the timed controller, and what a model took."""
     perfect = controller == "mpc perfect"
     folder = out / ("plants_foreseen" if perfect else "plants")
     path = write_plant(name, folder, "none" if perfect else "day_ahead")

@@ -26,7 +26,7 @@ from _table import markdown, write
 from foreign_models.plants import PLANTS
 
 from mpc.control.identified.conformal import Guarantee
-from mpc.control.identified.controller import IdentifiedController, IdentifiedSettings
+from mpc.control.identified.controller import IdentifiedSettings
 from mpc.errors import EnergyPlusError
 from mpc.kpi.kpis import measure_kpis
 
@@ -43,8 +43,6 @@ def perform(name: str, share: float, out: Path, start: str, days: int) -> dict[s
         return dict(json.loads(path.read_text(encoding="utf-8")))
     settings = IdentifiedSettings(guarantee=Guarantee(share) if share else None)
     loop, scenario, timed, _ = drive(name, "mpc", out, pd.Timestamp(start), days, settings)
-    controller = timed.controller
-    assert isinstance(controller, IdentifiedController)
     parts = round(scenario.grid.step / loop.record.step)
     zone = 0.5 * (loop.record.zone_temperature[1:] + loop.record.zone_temperature[:-1])
     zone = zone.reshape(-1, parts, zone.shape[1]).mean(axis=1)

@@ -86,7 +86,7 @@ class HeatLimit:
 
 
 def bin_of(outdoor: float) -> int:
-    """Number of the bin of an outdoor temperature.
+    """Tell the bin of an outdoor temperature.
 
     Parameters
     ----------

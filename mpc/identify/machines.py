@@ -73,9 +73,9 @@ class Machine:
     def level(self, telemetry: PlantTelemetry) -> FloatArray:
         """Load as a share of full load, shape (n_time,) [-]; NaN while nothing says it.
 
-        That of a machine is its command, as it was set, else as the plant measures it under the actuator's own name. Where
-        none was recorded, and of setpoints, it is the share of the heat of full load, the 98th percentile of what was
-        seen; a setpoint's may be more than 1.
+        That of a machine is its command, as it was set, else as the plant measures it under the actuator's own name.
+        Where none was recorded, and of setpoints, it is the share of the heat of full load, the 98th percentile of what
+        was seen, and may be more than 1.
 
         Parameters
         ----------
@@ -87,8 +87,7 @@ class Machine:
         if self.role == "machine" and any(values.notna().any() for values in told):
             command = told[0] if len(told) == 1 else told[0].fillna(told[1])
             return np.asarray((command.to_numpy(dtype=float) - low) / (high - low))
-        most = 1.0 if self.role == "machine" else np.inf
-        return np.clip(self.signal(telemetry) / self.full(telemetry), 0.0, most)
+        return np.maximum(self.signal(telemetry) / self.full(telemetry), 0.0)
 
     def full(self, telemetry: PlantTelemetry) -> float:
         """Heat of full load [W].

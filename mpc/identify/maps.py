@@ -286,8 +286,8 @@ def map_machines(
         if machine.role == "machine":
             made.append(replace(found, operation=_operation(found)))
         else:
-            level = loads.level[:, m]
-            made.append(replace(found, above=_local(level, above[:, m]), limits=_limits(loads.outdoor, level, above[:, m])))
+            level, over = loads.level[:, m], above[:, m]
+            made.append(replace(found, above=_local(level, over), limits=_limits(loads.outdoor, level, over)))
     return tuple(made), {kind: base for kind, (_, base) in powers.items()}
 
 
@@ -309,7 +309,7 @@ def _local(level: FloatArray, above: FloatArray) -> tuple[float, float]:
 
 
 def _limits(outdoor: FloatArray, level: FloatArray, above: FloatArray) -> tuple[tuple[float, float], ...]:
-    """Outdoor air and load of the steps at which a setpoint was out of reach, or the load full; the most of each bin."""
+    """Outdoor air and load of steps at which a setpoint was out of reach, or the load full: the most of each bin."""
     found: dict[int, tuple[float, float]] = {}
     for k in np.flatnonzero((above > OUT_OF_REACH) & (level > _SAME) | (level >= 1.0)):
         known = found.get(bin_of(outdoor[k]))

@@ -10,8 +10,8 @@ from typing import Any
 
 import pandas as pd
 
-from mpc.adapters.described.load import load_plant, period_of, read_description
 from mpc.adapters.boptest.scenario import PERIOD_DAYS
+from mpc.adapters.described.load import load_plant, period_of, read_description
 from mpc.adapters.described.schema import PlantFile
 from mpc.adapters.described.seen import seen_scenario
 from mpc.baselines.plants import FullSpeed
@@ -125,8 +125,8 @@ class PlantStudy:
         forecaster, file = getattr(plant, "forecaster", None), self.description
         if forecaster is not None:
             return int(forecaster.scenario.grid.n_steps - forecaster.horizon)
-        forecasts, advice = file.plant.kind == "boptest", "name `weather` and `prices`"
-        PlantError.unless(forecasts, f"plant {self.name}", "weather, prices and bands in its description", "none", advice)
+        expected, advice = "weather, prices and bands in its description", "name `weather` and `prices`"
+        PlantError.unless(file.plant.kind == "boptest", f"plant {self.name}", expected, "none", advice)
         days = PERIOD_DAYS if isinstance(file.period, str) else file.period.days
         return round(days * 86_400.0 / plant.control_step)
 

@@ -148,9 +148,10 @@ class IdentifiedController:
         self._hold = max(round(self.settings.run / model.step), 1)
         self._back = max(self.settings.starts - self._most, 0.0) * model.step / 86_400.0
         asked = self.settings.guarantee
-        self.conformal = None if asked is None else ConformalBackOff(asked, len(model.box.zones), self.settings.back_off)
-        self._edges: FloatArray = np.empty((0, len(model.box.zones)))
-        self._kept: FloatArray = np.empty((0, len(model.box.zones)))
+        zones = len(model.box.zones)
+        self.conformal = None if asked is None else ConformalBackOff(asked, zones, self.settings.back_off)
+        self._edges: FloatArray = np.empty((0, zones))
+        self._kept: FloatArray = np.empty((0, zones))
         self.back_offs: list[float] = []
 
     def _back_off(self, ahead: Ahead) -> FloatArray:
