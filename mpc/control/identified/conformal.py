@@ -56,9 +56,9 @@ class ConformalBackOff:
     """Adaptive conformal inference on the misses of comfort: the back-off grows by each and shrinks without.
 
     ``b_{t+1} = clip(b_t + η (err_t - α))`` with ``err_t`` 1 where a zone is outside of its band in an occupied step,
-    else 0; of each zone one b for the hour `AFTER` its lower edge has risen, and one for all others. Summed up, the share of
-    violations of each differs from α by at most ``(range + η) / (η T)`` after its T steps, whatever plant, model and
-    weather do, as long as b is not held at an end of its range (Gibbs and Candès 2021, Adaptive conformal
+    else 0; of each zone one b for the hour `AFTER` its lower edge has risen, and one for all others. Summed up, the
+    share of violations of each differs from α by at most ``(range + η) / (η T)`` after its T steps, whatever plant,
+    model and weather do, as long as b is not held at an end of its range (Gibbs and Candès 2021, Adaptive conformal
     inference under distribution shift, doi:10.48550/arXiv.2106.00170, proposition 4.1; on the scale of the score
     rather than of its quantile as of Angelopoulos, Candès and Tibshirani 2023, doi:10.48550/arXiv.2307.16895, section
     2.1, as zones are at the edge of their band only in some hours, and a quantile would take months to move).
