@@ -128,7 +128,7 @@ class PlantStudy:
         expected, advice = "weather, prices and bands in its description", "name `weather` and `prices`"
         PlantError.unless(file.plant.kind == "boptest", f"plant {self.name}", expected, "none", advice)
         days = PERIOD_DAYS if isinstance(file.period, str) else file.period.days
-        return round(days * 86_400.0 / plant.control_step)
+        return round(days * 86_400.0 / float(plant.control_step))
 
     def machines(self, plant: Any) -> tuple[Machine, ...]:
         """Actuators that are controlled.

@@ -26,7 +26,7 @@ class SeenRate:
     Parameters
     ----------
     values : ndarray, shape (n_steps,)
-        One a step.
+        One a step [unit of the quantity].
     """
 
     values: FloatArray
