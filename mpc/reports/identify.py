@@ -18,6 +18,7 @@ from mpc.studies.described import Experiment
 #: What terms of a map are called.
 _TERMS = {
     "standing": "at any speed above zero", "command": "at full load", "command^2": "square of the load",
+    "command^2 outdoor": "square of the load, a 10 K warmer outdoor air",
     "outdoor": "a 10 K warmer outdoor air", "emitter": "a 10 K warmer floor",
 }  # fmt: skip
 _OPERATION = {
