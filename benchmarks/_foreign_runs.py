@@ -18,12 +18,14 @@ from foreign_models.plants import PLANTS, write_plant
 
 from mpc.adapters.energyplus.input import weather_path
 from mpc.baselines.plants import LEAD, FullSpeed, OwnControl
+from mpc.control.identified.controller import IdentifiedSettings
 from mpc.identify.excitation import ExcitationSettings
 from mpc.identify.identify import identify
 from mpc.identify.model import FILE, PlantModel, read_model
+from mpc.identify.telemetry import run_recorded
 from mpc.kpi.kpis import measure_kpis
 from mpc.loop.plant import Controller, Measurements
-from mpc.loop.run import ClosedLoopRun, run_closed_loop
+from mpc.loop.run import ClosedLoopRun
 from mpc.scenario.forecast import Forecast
 from mpc.scenario.scenario import Scenario
 from mpc.studies.described import PlantStudy, experiment_period, run_experiment
@@ -70,16 +72,25 @@ class Timed:
 
 def run(name: str, which: str, controller: str, out: Path) -> dict[str, Any]:
     """Let a controller run a plant in its ``coldest`` or ``typical`` period; optimal control is identified first."""
+    begin = pd.Timestamp(starts(weather_path(PLANTS[name].weather))[which])
+    loop, scenario, timed, spent = drive(name, controller, out, begin, DAYS)
+    return account(loop, scenario, timed.seconds) | spent
+
+
+def drive(
+    name: str, controller: str, out: Path, begin: pd.Timestamp, days: int, settings: IdentifiedSettings | None = None
+) -> tuple[ClosedLoopRun, Scenario, Timed, dict[str, Any]]:
+    """Close the loop for some days: the run, its scenario, the timed controller, and what a model took."""
     perfect = controller == "mpc perfect"
     folder = out / ("plants_foreseen" if perfect else "plants")
     path = write_plant(name, folder, "none" if perfect else "day_ahead")
     model, spent = identified(name, out) if "mpc" in controller else (None, {})
-    begin = pd.Timestamp(starts(weather_path(PLANTS[name].weather))[which])
-    study = PlantStudy(path, start=f"{begin:%Y-%m-%d}", end=f"{begin + pd.Timedelta(days=DAYS):%Y-%m-%d}", model=model)
+    first, last = (f"{day:%Y-%m-%d}" for day in (begin, begin + pd.Timedelta(days=days)))
+    study = PlantStudy(path, start=first, end=last, model=model, settings=settings or IdentifiedSettings())
     with study.plant() as plant:
         timed = Timed(CONTROLLERS[controller](study, plant))
-        loop = run_closed_loop(plant, timed, forecasts=True)
-        return account(loop, study.scenario(plant), timed.seconds) | spent
+        loop, seen = run_recorded(plant, timed, study.site)
+        return loop, study.scenario(plant, seen), timed, spent
 
 
 def identified(name: str, out: Path) -> tuple[PlantModel, dict[str, Any]]:

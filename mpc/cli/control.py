@@ -41,8 +41,9 @@ class StudyOptions:
     ] = None
     at: Annotated[str | None, value("Unit or server in the place of that of a plant.yaml.", "FILE|URL")] = None
     violations: Annotated[
-        str | None, value("Share of occupied steps below the band that is allowed, such as 5%; of a plant.yaml.", "P")
-    ] = None
+        str,
+        value("Share of occupied steps below the band that is kept, such as 5%, or none; of a plant.yaml.", "P"),
+    ] = "1%"
     starts: Annotated[int, value("Most starts of a machine in 24 hours; of a plant.yaml.")] = 10
     parameters: Parameters = None
     controller_parameters: Annotated[
@@ -94,7 +95,8 @@ class StudyOptions:
         from mpc.identify.model import read_model
         from mpc.studies.described import PlantStudy
 
-        guarantee = None if self.violations is None else Guarantee(share(self.violations, "--violations"))
+        asked = self.violations
+        guarantee = None if asked == "none" else Guarantee(share(asked, "--violations"))
         settings = IdentifiedSettings(starts=self.starts, guarantee=guarantee)
         if self.comfort_price is not None:
             settings = replace(settings, comfort_price=self.comfort_price)

@@ -114,13 +114,14 @@ def _loads(telemetry: PlantTelemetry, machines: Sequence[Machine], data: GreyBox
 
 
 def _above(telemetry: PlantTelemetry, machines: Sequence[Machine]) -> FloatArray:
-    """How far setpoints lie above the air of their zones, shape (n_time, n_machine) [K]."""
+    """How far setpoints lie above the air of their zones at the ends of the steps, shape (n_time, n_machine) [K]."""
     columns = []
     for machine in machines:
         set_to = telemetry.frame.get(f"{SET}{machine.name}")
         measured = telemetry.frame.get(machine.name)
         value = set_to if set_to is not None and set_to.notna().any() else measured
-        zone = telemetry.frame[f"{machine.serves[0]}/{ZONE_TEMPERATURE}"]
+        mean = telemetry.frame[f"{machine.serves[0]}/{ZONE_TEMPERATURE}"]
+        zone = 0.5 * (mean + mean.shift(-1))
         if machine.role == "setpoint" and value is not None:
             columns.append((value - zone).to_numpy(dtype=float))
         else:
@@ -133,8 +134,8 @@ def _notes(telemetry: PlantTelemetry, machines: Sequence[Machine], suns: Sequenc
     for machine in machines:
         if not machine.heat:
             notes.append(f"no heat of {machine.name} is measured: it is counted in watts of what is bought at 7 degC")
-        told = telemetry.frame.get(f"{SET}{machine.name}")
-        if machine.role == "machine" and (told is None or told.isna().all()):
+        told = [telemetry.frame[c] for c in (f"{SET}{machine.name}", machine.name) if c in telemetry.frame]
+        if machine.role == "machine" and all(values.isna().all() for values in told):
             notes.append(f"no command of {machine.name} was recorded: its load is the share of the largest heat seen")
     if not suns:
         notes.append("no irradiance is known: the sun is part of the unmeasured heat")

@@ -73,8 +73,9 @@ class Machine:
     def level(self, telemetry: PlantTelemetry) -> FloatArray:
         """Load as a share of full load, shape (n_time,) [-]; NaN while nothing says it.
 
-        That of a machine is its command. Where none was recorded, and of setpoints, it is the share of the heat of full
-        load, the 98th percentile of what was seen.
+        That of a machine is its command, as it was set, else as the plant measures it under the actuator's own name.
+        Where none was recorded, and of setpoints, it is the share of the heat of full load, the 98th percentile of what
+        was seen, and may be more than 1.
 
         Parameters
         ----------
@@ -82,10 +83,11 @@ class Machine:
             Of the plant.
         """
         low, high = self.actuator.lowest, self.actuator.highest
-        told = telemetry.frame.get(f"{SET}{self.name}")
-        if self.role == "machine" and told is not None and told.notna().any():
-            return np.asarray((told.to_numpy(dtype=float) - low) / (high - low))
-        return np.clip(self.signal(telemetry) / self.full(telemetry), 0.0, 1.0)
+        told = [telemetry.frame[c] for c in (f"{SET}{self.name}", self.name) if c in telemetry.frame]
+        if self.role == "machine" and any(values.notna().any() for values in told):
+            command = told[0] if len(told) == 1 else told[0].fillna(told[1])
+            return np.asarray((command.to_numpy(dtype=float) - low) / (high - low))
+        return np.maximum(self.signal(telemetry) / self.full(telemetry), 0.0)
 
     def full(self, telemetry: PlantTelemetry) -> float:
         """Heat of full load [W].

@@ -9,6 +9,7 @@ from typing import Any, Literal, Self
 import numpy as np
 
 from mpc.errors import PlantError
+from mpc.identify.limits import OUT_OF_REACH, bin_of
 from mpc.identify.machines import Machine
 from thermal._types import BoolArray, FloatArray
 
@@ -85,6 +86,7 @@ def features_of(on: Any, u: Any, outdoor: Any, emitter: Any) -> dict[str, Any]:
         "command^2": u * u,
         "outdoor": u * (outdoor - OUTDOOR) / PER,
         "emitter": u * (emitter - EMITTER) / PER,
+        "command^2 outdoor": u * u * (outdoor - OUTDOOR) / PER,
     }
 
 
@@ -104,6 +106,8 @@ class MachineMap:
         Of each kind that is bought [W].
     above : tuple of float
         Of a setpoint: how far it lies above the zone's air at no load and at full load [K].
+    limits : tuple of tuple of float
+        Of a setpoint: outdoor air [K] and load [-] of steps at which no more heat was to be had.
     """
 
     machine: Machine
@@ -111,6 +115,7 @@ class MachineMap:
     heat: Curve
     powers: Mapping[str, Curve]
     above: tuple[float, float] = (0.0, 0.0)
+    limits: tuple[tuple[float, float], ...] = ()
 
     def at(self, curve: Curve, u: Any, outdoor: Any, emitter: Any) -> Any:
         """Evaluate at a duty or load, for a controller: duty is a share of the time at full load [W].
@@ -181,18 +186,21 @@ class Loads:
         rows = self.known
         u, emitter, outdoor = self.level[rows, m], self.emitter[rows, m], self.outdoor[rows]
         found = features_of((u > 1e-6).astype(float), u, outdoor, emitter)
-        levels = np.unique(np.round(u[u > 1e-6] / _SAME))
         running = u > 1e-6
+        levels = np.unique(np.round(u[running] / _SAME))
         left_out = {
             "standing": len(levels) < 2,
             "command^2": len(levels) < 3,
             "outdoor": running.sum() < 8 or np.std(outdoor[running]) < _TOLD,
             "emitter": running.sum() < 8 or np.std(emitter[running]) < _TOLD,
+            "command^2 outdoor": len(levels) < 3 or np.std(outdoor[running]) < _TOLD,
         }
         return {name: values for name, values in found.items() if not left_out.get(name, False)}
 
 
-def regress(loads: Loads, values: FloatArray, machines: Sequence[int]) -> tuple[list[Curve], float]:
+def regress(
+    loads: Loads, values: FloatArray, machines: Sequence[int], *, base: bool = True
+) -> tuple[list[Curve], float]:
     """Regress what is measured on the features of machines, a constant beside them.
 
     Parameters
@@ -203,6 +211,9 @@ def regress(loads: Loads, values: FloatArray, machines: Sequence[int]) -> tuple[
         Measured [W].
     machines : sequence of int
         Which machines have a part in it.
+    base : bool
+        Whether something may be left when all machines are off; nothing tells that from the standing part of a machine
+        that never stops, which is then counted to it.
 
     Returns
     -------
@@ -219,11 +230,13 @@ def regress(loads: Loads, values: FloatArray, machines: Sequence[int]) -> tuple[
     from statsmodels.regression.linear_model import OLS
 
     rows = loads.known & np.isfinite(values)
-    columns, owners = [np.ones(int(rows.sum()))], [(-1, "constant")]
+    columns, owners = ([np.ones(int(rows.sum()))], [(-1, "constant")]) if base else ([], [])
     for m in machines:
         for name, feature in loads.features(m).items():
-            columns.append(feature[rows[loads.known]])
-            owners.append((m, name))
+            column = feature[rows[loads.known]]
+            if not (base and name == "standing" and column.all()):
+                columns.append(column)
+                owners.append((m, name))
     PlantError.unless(
         rows.sum() > 4 * len(columns), "component maps", f"{4 * len(columns)} steps with known commands", rows.sum(),
         "give more days, or telemetry whose commands are recorded",
@@ -237,7 +250,7 @@ def regress(loads: Loads, values: FloatArray, machines: Sequence[int]) -> tuple[
         for m in machines
     ]
     curves = [Curve({n: c for n, (c, _) in p.items()}, {n: d for n, (_, d) in p.items()}) for p in parts]
-    return curves, float(found.params[0])
+    return curves, float(found.params[0]) if base else 0.0
 
 
 def map_machines(
@@ -266,7 +279,8 @@ def map_machines(
         Power of each kind that no machine explains [W].
     """
     everyone = range(len(machines))
-    heats = [regress(loads, signals[:, m], [m])[0][0] for m in everyone]
+    stops = [bool((loads.level[:, m] <= 1e-6).any()) for m in everyone]
+    heats = [regress(loads, signals[:, m], [m], base=stops[m])[0][0] for m in everyone]
     powers = {kind: regress(loads, values, everyone) for kind, values in bought.items() if np.ptp(values) > 1.0}
     made = []
     for m, machine in enumerate(machines):
@@ -274,7 +288,8 @@ def map_machines(
         if machine.role == "machine":
             made.append(replace(found, operation=_operation(found)))
         else:
-            made.append(replace(found, above=_local(loads.level[:, m], above[:, m])))
+            level, over = loads.level[:, m], above[:, m]
+            made.append(replace(found, above=_local(level, over), limits=_limits(loads.outdoor, level, over)))
     return tuple(made), {kind: base for kind, (_, base) in powers.items()}
 
 
@@ -293,6 +308,16 @@ def _local(level: FloatArray, above: FloatArray) -> tuple[float, float]:
         return 0.0, 1.0
     slope, zero = np.polyfit(level[between], above[between], 1)
     return float(zero), float(zero + max(slope, 0.0))
+
+
+def _limits(outdoor: FloatArray, level: FloatArray, above: FloatArray) -> tuple[tuple[float, float], ...]:
+    """Outdoor air and load of steps at which a setpoint was out of reach, or the load full: the most of each bin."""
+    found: dict[int, tuple[float, float]] = {}
+    for k in np.flatnonzero((above > OUT_OF_REACH) & (level > _SAME) | (level >= 1.0)):
+        known = found.get(bin_of(outdoor[k]))
+        if known is None or level[k] > known[1]:
+            found[bin_of(outdoor[k])] = (float(outdoor[k]), float(level[k]))
+    return tuple(sorted(found.values()))
 
 
 def interval_of(curve: Curve, feature: str) -> tuple[float, float]:

@@ -50,6 +50,7 @@ class PlantModel:
                 "machine": {**{k: v for k, v in vars(m.machine).items() if k != "actuator"},
                             "actuator": asdict(m.machine.actuator)},
                 "operation": m.operation, "heat": asdict(m.heat), "above": list(m.above),
+                "limits": [list(pair) for pair in m.limits],
                 "powers": {kind: asdict(curve) for kind, curve in m.powers.items()},
             }
             for m in self.maps
@@ -87,7 +88,8 @@ def _map_of(entry: Mapping[str, Any]) -> MachineMap:
     told = entry["machine"]
     machine = Machine(Actuator(**told["actuator"]), told["role"], tuple(told["serves"]), told["heat"], told["power"])
     powers = {kind: Curve(**curve) for kind, curve in entry["powers"].items()}
-    return MachineMap(machine, entry["operation"], Curve(**entry["heat"]), powers, tuple(entry["above"]))
+    limits = tuple((float(outdoor), float(load)) for outdoor, load in entry["limits"])
+    return MachineMap(machine, entry["operation"], Curve(**entry["heat"]), powers, tuple(entry["above"]), limits)
 
 
 def read_model(folder: Path) -> PlantModel:

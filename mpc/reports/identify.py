@@ -20,6 +20,7 @@ from mpc.studies.described import Experiment
 _TERMS = {
     "standing": "at any speed above zero", "command": "times the load", "command^2": "times the load squared",
     "outdoor": "times the load, outdoor air 10 K warmer", "emitter": "times the load, floor 10 K warmer",
+    "command^2 outdoor": "times the load squared, outdoor air 10 K warmer",
 }  # fmt: skip
 _OPERATION = {
     "duty": "run at full load or not at all",

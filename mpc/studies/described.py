@@ -10,8 +10,10 @@ from typing import Any
 
 import pandas as pd
 
+from mpc.adapters.boptest.scenario import PERIOD_DAYS
 from mpc.adapters.described.load import load_plant, period_of, read_description
 from mpc.adapters.described.schema import PlantFile
+from mpc.adapters.described.seen import seen_scenario
 from mpc.baselines.plants import FullSpeed
 from mpc.control.identified.controller import IdentifiedController, IdentifiedSettings
 from mpc.errors import ControlError, PlantError
@@ -87,8 +89,28 @@ class PlantStudy:
         """Make the plant, to be reset, and freed by leaving a ``with`` block."""
         return load_plant(self.path, at=self.at, changes=self._changes)
 
-    def scenario(self, plant: Any) -> Scenario:
-        """Scenario that a plant's indicators are measured by.
+    def scenario(self, plant: Any, seen: PlantTelemetry) -> Scenario:
+        """Scenario that a run's indicators are measured by.
+
+        Parameters
+        ----------
+        plant : ForeignPlant
+            Of this study.
+        seen : PlantTelemetry
+            Of the run: a server's scenario is what it forecast for each step.
+
+        Raises
+        ------
+        PlantError
+            When the description says too little.
+        """
+        forecaster = getattr(plant, "forecaster", None)
+        if forecaster is None:
+            return seen_scenario(self.description, seen.frame, seen.step)
+        return forecaster.scenario  # type: ignore[no-any-return]
+
+    def steps(self, plant: Any) -> int:
+        """Count the control steps of a run.
 
         Parameters
         ----------
@@ -98,13 +120,15 @@ class PlantStudy:
         Raises
         ------
         PlantError
-            When the description says too little, or a server has it.
+            When nothing forecasts weather, prices and bands, which controllers and indicators need.
         """
-        forecaster = getattr(plant, "forecaster", None)
-        advice = "name `weather` and `prices`; of a server, run the unit's file with --at"
-        if forecaster is None:
-            raise PlantError(f"plant {self.name}", "weather, prices and bands in its description", "none", advice)
-        return forecaster.scenario  # type: ignore[no-any-return]
+        forecaster, file = getattr(plant, "forecaster", None), self.description
+        if forecaster is not None:
+            return int(forecaster.scenario.grid.n_steps - forecaster.horizon)
+        expected, advice = "weather, prices and bands in its description", "name `weather` and `prices`"
+        PlantError.unless(file.plant.kind == "boptest", f"plant {self.name}", expected, "none", advice)
+        days = PERIOD_DAYS if isinstance(file.period, str) else file.period.days
+        return round(days * 86_400.0 / float(plant.control_step))
 
     def machines(self, plant: Any) -> tuple[Machine, ...]:
         """Actuators that are controlled.
@@ -303,11 +327,13 @@ def run_experiment(
         Called with stage, done, total.
     """
     with study.plant() as plant:
-        machines, scenario = study.machines(plant), study.scenario(plant)
+        study.steps(plant)  # refuses a plant without forecasts before it runs
+        machines = study.machines(plant)
         excitation = Excitation(machines, plant.control_step, settings)
         steps = round(days * 86_400.0 / plant.control_step)
         report = None if progress is None else (lambda done, _: progress("experiment", done, steps))
         run, telemetry = run_recorded(plant, excitation, study.site, steps, report)
+        scenario = study.scenario(plant, telemetry)
     return Experiment(telemetry, run, scenario, machines, excitation.handed_back / (steps * len(machines)))
 
 

@@ -152,10 +152,10 @@ def _run_described(study: PlantStudy, name: str, progress: Progress | None) -> C
     """Run a described plant on its control steps; indicators are measured on its own ones."""
     entry = find_controller(name, "plant")
     with study.plant() as plant:
-        watched, scenario = _Watched(_made(entry, study, plant)), study.scenario(plant)
-        total = scenario.grid.n_steps - plant.forecaster.horizon
+        watched, total = _Watched(_made(entry, study, plant)), study.steps(plant)
         report = None if progress is None else (lambda done, _: progress(name, done, total))
         loop, seen = run_recorded(plant, watched, study.site, progress=report)
+        scenario = study.scenario(plant, seen)
         kpis = measure_kpis(loop.record, scenario, control_step=plant.control_step)
         left = RecordedPlant(seen, tuple(plant.columns), plant.control_step)
     steps = len(loop.measurements)

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from calibration.estimation.state_space import REFERENCE
-from mpc.control.identified.conformal import ConformalBackOff, Guarantee
+from mpc.control.identified.conformal import AFTER, ConformalBackOff, Guarantee, risen
 from mpc.control.identified.observer import GreyBoxObserver
 from mpc.control.identified.problem import SCALE, Ahead, IdentifiedProblem
+from mpc.control.identified.thermostats import Thermostats
 from mpc.control.solvers.solution import Status
 from mpc.control.solvers.stages import StageSolution, StageSolver
 from mpc.errors import ControlError
@@ -28,8 +29,8 @@ from thermal.case.building import Location
 #: Share of a day's starts that may be used at once [-].
 _AT_ONCE = 1.0 / 3.0
 
-#: A duty above this is a run, a load below the other one is none [-].
-_HALF, _IDLE = 0.5, 0.02
+#: A duty above this is a run [-].
+_HALF = 0.5
 
 
 @dataclass(frozen=True)
@@ -42,15 +43,15 @@ class IdentifiedSettings:
         Of a zone's kelvin outside of its band for an hour [currency/K/h]: some hundred times what a kelvin less saves
         a house in an hour, so that bands are left only where they cannot be kept.
     back_off : float
-        Distance that is kept from the edges of the bands [K]; where a guarantee is asked for, that of its start.
+        Distance that is kept from the lower edges of the bands [K]; where a guarantee is asked for, that of its start.
     start_price : float
         Of a start of a machine [currency]: a compressor of 5,000 that bears 100,000 starts.
     starts : int
         Most starts of a machine within 24 hours.
     run : float
         Shortest run and shortest rest of a machine [s].
-    guarantee : Guarantee, optional
-        Share of violations that is asked for.
+    guarantee : Guarantee or None
+        Share of violations that is kept; None keeps the back-off as it is.
     """
 
     comfort_price: float = 10.0
@@ -58,7 +59,7 @@ class IdentifiedSettings:
     start_price: float = 0.05
     starts: int = 10
     run: float = 1800.0
-    guarantee: Guarantee | None = None
+    guarantee: Guarantee | None = field(default_factory=Guarantee)
 
 
 @dataclass
@@ -143,16 +144,21 @@ class IdentifiedController:
         self._plan: StageSolution | None = None
         self._most = max(_AT_ONCE * self.settings.starts, 1.0)
         self._runs = [_Runs(self._most) for _ in model.maps]
+        self._thermostats = Thermostats(model)
         self._hold = max(round(self.settings.run / model.step), 1)
         self._back = max(self.settings.starts - self._most, 0.0) * model.step / 86_400.0
         asked = self.settings.guarantee
-        self.conformal = None if asked is None else ConformalBackOff(asked, self.settings.back_off)
+        zones = len(model.box.zones)
+        self.conformal = None if asked is None else ConformalBackOff(asked, zones, self.settings.back_off)
+        self._edges: FloatArray = np.empty((0, zones))
+        self._kept: FloatArray = np.empty((0, zones))
         self.back_offs: list[float] = []
 
-    @property
-    def back_off(self) -> float:
-        """Distance that is kept from the bands now [K]."""
-        return self.settings.back_off if self.conformal is None else self.conformal.value
+    def _back_off(self, ahead: Ahead) -> FloatArray:
+        """Distance that is kept from the lower edges, shape (N, n_zone) [K]."""
+        if self.conformal is None:
+            return np.full(ahead.lower.shape, self.settings.back_off)
+        return self.conformal.along(risen(ahead.lower, self.model.step, self._edges))
 
     def step(self, measurements: Measurements, forecast: Forecast | None) -> PlannedAction:
         """Choose values of the actuators.
@@ -176,7 +182,8 @@ class IdentifiedController:
         self._observe(measurements, ahead)
         if self._solver is None or self._solver.n_steps != len(ahead.outdoor):
             self._solver, self._plan = StageSolver(self._problem.stage, len(ahead.outdoor), tolerance=1e-6), None
-        self.back_offs.append(self.back_off)
+        self._kept = self._back_off(ahead)
+        self.back_offs.append(float(self._kept[0].mean()))
         solution = self._decided(ahead)
         levels = solution.decisions[0] if solution is not None else self._by_rule(measurements, ahead)
         source = "optimal plan" if solution is not None else "rules"
@@ -198,10 +205,15 @@ class IdentifiedController:
             self._observer.start(measurements, float(ahead.outdoor[0]))
             return
         before, levels = self._before
+        self._thermostats.learn(measurements, self._observer.zones(measurements), float(before.outdoor[0]))
         self._observer.update(measurements, before, levels)
         if self.conformal is not None:
             realised = self._inside(self._observer.zones(measurements) - REFERENCE, before)
-            self.conformal.update(realised, before.occupied[0])
+            self.conformal.update(
+                realised, before.occupied[0], risen(before.lower[:1], self.model.step, self._edges)[0]
+            )
+        count = max(round(AFTER / self.model.step), 1)
+        self._edges = np.vstack([self._edges, before.lower[:1]])[-count:]
 
     def _inside(self, zone: FloatArray, ahead: Ahead) -> FloatArray:
         """Distance from the lower edge of the band of the first step, positive inside, shape (n_zone,) [K].
@@ -213,7 +225,7 @@ class IdentifiedController:
     def _decided(self, ahead: Ahead) -> StageSolution | None:
         """Plan, with the first steps of machines in duty whole."""
         count, m = len(ahead.outdoor), len(self.model.maps)
-        low, high = np.zeros((count, m)), np.ones((count, m))
+        low, high = np.zeros((count, m)), self._thermostats.most(ahead.outdoor)
         best: StageSolution | None = None
         whole = [k for k, found in enumerate(self.model.maps) if found.operation == "duty"]
         for k in whole:
@@ -265,7 +277,7 @@ class IdentifiedController:
         state, solver = self._observer.state, self._solver
         if solver is None:
             return None
-        data = self._problem.data(state, ahead, self.back_off, self.settings.comfort_price, ends)
+        data = self._problem.data(state, ahead, self._kept, self.settings.comfort_price, ends)
         guess = np.full((len(ahead.outdoor), len(self.model.maps)), _HALF)
         if self._plan is not None:
             guess = self._plan.shifted()[1]
@@ -279,7 +291,7 @@ class IdentifiedController:
         """Levels without a plan: full where a zone is too cold, else none."""
         inside = self._inside(self._observer.zones(measurements) - REFERENCE, ahead)
         served = [[zone in found.machine.serves for zone in self.model.box.zones] for found in self.model.maps]
-        return np.array([float((inside[np.array(mine)] < self.back_off).any()) for mine in served])
+        return np.array([float((inside < self._kept[0])[np.array(mine)].any()) for mine in served])
 
     def _note(self, levels: FloatArray) -> None:
         """Write down which machines run."""
@@ -294,23 +306,29 @@ class IdentifiedController:
 
     def _values(self, levels: FloatArray, solution: StageSolution | None, ahead: Ahead) -> dict[str, float]:
         """Values of the actuators for levels."""
-        zone = self._observer.state if solution is None else 0.5 * (solution.states[0] + solution.states[1])
-        return {
-            found.machine.name: self._value(found, float(level), zone, ahead)
-            for found, level in zip(self.model.maps, levels, strict=True)
-        }
+        count = len(self.model.box.zones)
+        end = (self._observer.state if solution is None else solution.states[1])[:count] + REFERENCE
+        most, values = self._thermostats.most(ahead.outdoor[:1])[0], dict[str, float]()
+        for k, found in enumerate(self.model.maps):
+            level = float(levels[k])
+            if found.operation == "setpoint":
+                actuator = self._actuators[found.machine.name]
+                told = self._thermostats.tell(k, level, most[k], end, self._edge(found, ahead))
+                value = float(np.clip(told, actuator.lowest, actuator.highest))
+            else:
+                value = self._command(found, level)
+            values[found.machine.name] = value
+        return values
 
-    def _value(self, found: MachineMap, level: float, zone: FloatArray, ahead: Ahead) -> float:
-        """Value of an actuator for a level: a setpoint follows the expected air of its zone."""
+    def _edge(self, found: MachineMap, ahead: Ahead) -> float:
+        """Lower edge of the band of the zones of a machine, and what is kept from it [K]."""
+        served = [k for k, name in enumerate(self.model.box.zones) if name in found.machine.serves]
+        return float((ahead.lower[0] + self._kept[0])[served].max())
+
+    def _command(self, found: MachineMap, level: float) -> float:
+        """Value of a machine's actuator for a level."""
         actuator = self._actuators[found.machine.name]
         low, high = actuator.lowest, actuator.highest
-        if found.operation == "setpoint":
-            served = [k for k, name in enumerate(self.model.box.zones) if name in found.machine.serves]
-            idle, full = found.above
-            value = float(zone[served].mean()) + REFERENCE + idle + level * (full - idle)
-            # a thermostat holds what it is told: told the edge it keeps the band where the model is wrong
-            edge = float(ahead.lower[0, served].max()) + max(self.back_off, 0.0)
-            return float(np.clip(edge if level <= _IDLE else max(value, edge), low, high))
         if found.operation == "duty":
             return high if level > _HALF else low
         value = low + level * (high - low)

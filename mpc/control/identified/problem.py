@@ -25,6 +25,9 @@ SCALE = 10.0
 #: Weight of the square of a decision [currency]: what costs the same whenever it is done is done evenly.
 _EVEN = 1e-4
 
+#: Band that a back-off leaves [K].
+_NARROWEST = 0.1
+
 _PRICES = {"electricity": "electricity_price", "gas": "gas_price"}
 
 
@@ -71,11 +74,17 @@ class Ahead:
         """
         table, zones = forecast.table, model.box.zones
 
-        def of_zones(name: str) -> FloatArray:
-            return forecast.values([f"{zone}/{name}" for zone in zones], fill="hold")
+        def of_zones(name: str) -> list[str]:
+            return [f"{zone}/{name}" for zone in zones]
 
-        def known(name: str) -> FloatArray:
-            return forecast.values([name], fill="hold")[:, 0] if name in table else np.zeros(len(table))
+        edges = of_zones("comfort_lower_temperature"), of_zones("comfort_upper_temperature")
+        told = [name for name in (*of_zones("occupancy_count_sensor"), *of_zones("internal_gain"), *_PRICES.values())
+                if name in table]  # fmt: skip
+        names = [OUTDOOR_TEMPERATURE, *edges[0], *edges[1], *told]
+        known = dict(zip(names, forecast.values(names, fill="hold").T, strict=True))
+
+        def columns(wanted: list[str]) -> FloatArray:
+            return np.column_stack([known.get(name, np.zeros(len(table))) for name in wanted])
 
         suns = facade_sun(location, model.step, table) if model.box.suns else {}
         sun = (
@@ -83,16 +92,12 @@ class Ahead:
             if suns
             else np.zeros((len(table), len(model.box.suns)))
         )
-        people = of_zones("occupancy_count_sensor") if f"{zones[0]}/occupancy_count_sensor" in table else None
-        gains = (
-            of_zones("internal_gain") if f"{zones[0]}/internal_gain" in table else np.zeros((len(table), len(zones)))
-        )
+        people = of_zones("occupancy_count_sensor")
+        occupied = columns(people) > 0.0 if people[0] in known else np.ones((len(table), len(zones)), dtype=bool)
         return cls(
-            forecast.values([OUTDOOR_TEMPERATURE], fill="hold")[:, 0], np.nan_to_num(sun),
-            gains + model.box.parts["constant gain"],
-            np.column_stack([known(_PRICES.get(carrier, "")) for carrier in CARRIERS]),
-            of_zones("comfort_lower_temperature"), of_zones("comfort_upper_temperature"),
-            np.ones((len(table), len(zones)), dtype=bool) if people is None else people > 0.0,
+            known[OUTDOOR_TEMPERATURE], np.nan_to_num(sun),
+            columns(of_zones("internal_gain")) + model.box.parts["constant gain"],
+            columns([_PRICES.get(carrier, "") for carrier in CARRIERS]), columns(edges[0]), columns(edges[1]), occupied,
         )  # fmt: skip
 
 
@@ -142,7 +147,7 @@ class IdentifiedProblem:
         self,
         state: FloatArray,
         ahead: Ahead,
-        back_off: float,
+        back_off: FloatArray,
         comfort_price: float,
         ends: tuple[FloatArray, FloatArray],
     ) -> StageData:
@@ -154,8 +159,8 @@ class IdentifiedProblem:
             Nodes less the reference [K], and unmeasured heat [W].
         ahead : Ahead
             Of the horizon.
-        back_off : float
-            By which bands are narrowed, or widened where it is negative [K].
+        back_off : ndarray, shape (N, n_zone)
+            By which lower edges are raised, or lowered where it is negative [K].
         comfort_price : float
             Of a zone's kelvin outside of its band for an hour [currency/K/h].
         ends : tuple of ndarray, shape (N, n_machine)
@@ -167,12 +172,10 @@ class IdentifiedProblem:
         gain = ahead.gain + keep[:, None] * state[nodes:]
         parameters = np.column_stack([ahead.outdoor, ahead.sun, gain, ahead.prices, *ends])
         # an edge lies in the bands of the step before and of the step after it; nothing can be done about the first
-        lower = (
-            np.vstack([ahead.lower[:1], np.maximum(ahead.lower[:-1], ahead.lower[1:]), ahead.lower[-1:]]) - REFERENCE
-        )
+        wanted = np.minimum(ahead.lower + back_off, ahead.upper - _NARROWEST) - REFERENCE
+        lower = np.vstack([wanted[:1], np.maximum(wanted[:-1], wanted[1:]), wanted[-1:]])
         upper = (
             np.vstack([ahead.upper[:1], np.minimum(ahead.upper[:-1], ahead.upper[1:]), ahead.upper[-1:]]) - REFERENCE
         )
-        narrow = np.minimum(back_off, 0.5 * (upper - lower) - 0.05)
         price = np.full((count + 1, zones), SCALE * comfort_price * step / HOUR)
-        return StageData(state[:nodes], parameters, lower + narrow, upper - narrow, price)
+        return StageData(state[:nodes], parameters, np.minimum(lower, upper), upper, price)

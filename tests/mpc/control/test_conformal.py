@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mpc.control.identified.conformal import RANGE, RATE, ConformalBackOff, Guarantee
+from mpc.control.identified.conformal import RANGE, RATE, ConformalBackOff, Guarantee, risen
 from mpc.errors import ControlError
+
+NONE = np.zeros(2, dtype=bool)
 
 
 @pytest.mark.parametrize("share", [0.05, 0.2])
@@ -14,23 +16,45 @@ from mpc.errors import ControlError
 def test_share_over_a_season(share: float, drift: float) -> None:
     """Autocorrelated misses whose mean drifts: the share is within a point, and within the theorem's bound."""
     rng, steps = np.random.default_rng(4), 5000
-    kept, miss = ConformalBackOff(Guarantee(share)), 0.0
+    kept, miss = ConformalBackOff(Guarantee(share), 2), 0.0
     for k in range(steps):
         miss = 0.9 * miss + 0.05 * rng.standard_normal()
-        inside = kept.value + miss + drift * np.sin(2 * np.pi * k / steps)
-        kept.update(np.array([inside, np.nan]), np.array([True, True]))
-        kept.update(np.array([-5.0, -5.0]), np.array([False, False]))  # nobody is in
-    assert kept.count == steps
+        inside = kept.values[0, 0] + miss + drift * np.sin(2 * np.pi * k / steps)
+        kept.update(np.array([inside, np.nan]), np.array([True, True]), NONE)
+        kept.update(np.array([-5.0, -5.0]), NONE, NONE)  # nobody is in
+    assert kept.count == steps and kept.values[1, 0] == 0.0
     seen = kept.outside / kept.count
     assert abs(seen - share) < 0.01 and abs(seen - share) <= (RANGE[1] - RANGE[0] + RATE) / (RATE * steps)
 
 
+def test_zones_and_hours_of_different_errors_have_each_their_own() -> None:
+    """A zone that is half a kelvin late in the morning, and right for the rest of the day, is only begun earlier."""
+    kept, late = ConformalBackOff(Guarantee(0.05), 2), np.array([0.5, 0.0])
+    rng, seen = np.random.default_rng(1), []
+    for k in range(150 * 40):
+        morning = np.full(2, k % 40 < 4)
+        noise = 0.02 * rng.standard_normal(2)
+        inside = kept.along(morning[None])[0] - late * morning + noise
+        kept.update(inside, np.array([True, True]), morning)
+        seen.append(inside < 0.0)
+    assert np.array(seen).mean() == pytest.approx(0.05, abs=0.01)
+    assert kept.values[0, 1] > 0.4 and np.abs(kept.values[[0, 1, 1], [0, 0, 1]]).max() < 0.12
+
+
+def test_hours_after_a_rise() -> None:
+    lower = np.array([288.0] * 4 + [293.0] * 8 + [288.0] * 4)[:, None]
+    found = risen(lower, 900.0)[:, 0]
+    assert np.flatnonzero(found).tolist() == [4, 5, 6, 7]
+    assert risen(lower[6:], 900.0, lower[2:6])[:, 0].tolist() == [True, True] + [False] * 8
+    assert not risen(lower[6:], 900.0)[:2].any()  # without what was before nothing has risen
+
+
 def test_range_holds_and_what_is_no_share_is_refused() -> None:
-    kept = ConformalBackOff(Guarantee(0.05, -0.1, 0.2), start=3.0)
-    assert kept.value == 0.2
+    kept = ConformalBackOff(Guarantee(0.05, -0.1, 0.2), 2, start=3.0)
+    assert (kept.values == 0.2).all()
     for _ in range(500):
-        kept.update(np.array([1.0]), np.array([True]))
-    assert kept.value == -0.1
+        kept.update(np.ones(2), ~NONE, NONE)
+    assert kept.values[:, 0].tolist() == [-0.1, -0.1] and kept.values[:, 1].tolist() == [0.2, 0.2]
     for share, low in ((0.0, -0.5), (5.0, -0.5), (0.05, 2.0)):
         with pytest.raises(ControlError, match="a share between 0 and 1"):
             Guarantee(share, low)

@@ -29,7 +29,8 @@ def test_coefficients_and_their_intervals() -> None:
     """Exact without noise; with autocorrelated noise 95 % intervals hold the standing power in 19 of 20 draws."""
     given = loads(0)
     (curve,), base = regress(given, power_of(given), [0])
-    expected = {"standing": 800.0, "command": 3000.0, "command^2": 0.0, "outdoor": -150.0, "emitter": 0.0}
+    expected = {"standing": 800.0, "command": 3000.0, "command^2": 0.0, "outdoor": -150.0, "emitter": 0.0,
+                "command^2 outdoor": 0.0}  # fmt: skip
     assert curve.coefficients == pytest.approx(expected, abs=1e-6) and base == pytest.approx(200.0)
     inside = 0
     for seed in range(60):

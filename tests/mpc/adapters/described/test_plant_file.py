@@ -176,7 +176,7 @@ def test_means_of_series_are_exact() -> None:
 
 
 def test_ready_descriptions_fit_the_schema() -> None:
-    assert len(ready_plants()) == 5 and "bestest_hydronic_heat_pump" in ready_plants()
+    assert len(ready_plants()) == 7 and "bestest_hydronic_heat_pump" in ready_plants()
     for name in ready_plants():
         described = PlantFile.model_validate(yaml.safe_load((READY / f"{name}.yaml").read_text(encoding="utf-8")))
         assert described.name == name

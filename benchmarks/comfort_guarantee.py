@@ -1,0 +1,102 @@
+"""Share of comfort violations that optimal control of identified plants keeps over a season, and what it costs.
+
+Each plant of `make_foreign_plants.py` is identified by an experiment of two weeks and controlled over a heating season,
+once for each share of occupied steps that may lie below the band, and once with the edge of the band as it is. Seen is
+the share of steps with people, over all zones, whose mean temperature lay below the band; energy is compared with the
+run without a guarantee.
+
+Run: ``python benchmarks/comfort_guarantee.py --out results/comfort_guarantee [--publish]`` with the extra
+``[energyplus]``; half an hour of CPU time for the default. What is finished is kept, one file a run. Writes
+``comfort_guarantee.json`` and ``.md``; with ``--publish`` also the table in ``docs/foreign_plants.md``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from _code import code
+from _foreign_runs import drive
+from _table import markdown, write
+from foreign_models.plants import PLANTS
+
+from mpc.control.identified.conformal import Guarantee
+from mpc.control.identified.controller import IdentifiedSettings
+from mpc.errors import EnergyPlusError
+from mpc.kpi.kpis import measure_kpis
+
+#: From the day after the first week of the year on, to the end of April.
+START, DAYS = "2023-01-09", 110
+COLUMNS = ("plant", "days", "asked, %", "seen, %", "below the band, K h a zone", "energy, kWh/m²",
+           "against none asked, %", "CPU, s")  # fmt: skip
+
+
+def perform(name: str, share: float, out: Path, start: str, days: int) -> dict[str, Any]:
+    """Run a plant with a share that is asked for, 0 for none, or read what came of it."""
+    path = out / name / f"{start}_{days}_{share:g}.json"
+    if path.exists():
+        return dict(json.loads(path.read_text(encoding="utf-8")))
+    settings = IdentifiedSettings(guarantee=Guarantee(share) if share else None)
+    loop, scenario, timed, _ = drive(name, "mpc", out, pd.Timestamp(start), days, settings)
+    parts = round(scenario.grid.step / loop.record.step)
+    zone = 0.5 * (loop.record.zone_temperature[1:] + loop.record.zone_temperature[:-1])
+    zone = zone.reshape(-1, parts, zone.shape[1]).mean(axis=1)
+    count = len(zone)
+    occupied = scenario.expected_occupancy[:count] > 0
+    kpis = measure_kpis(loop.record, scenario)
+    data = {
+        "plant": name, "start": start, "days": days, "asked": share, "code": code(),
+        "seen": float((zone < scenario.lower[:count])[occupied].mean()), "energy": kpis.ener_tot, "cost": kpis.cost_tot,
+        "below": sum(z.below for z in kpis.zones) / len(kpis.zones), "cpu_seconds": sum(timed.seconds),
+    }  # fmt: skip
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_suffix(".part")
+    part.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+    os.replace(part, path)
+    return data
+
+
+def table_of(runs: list[dict[str, Any]]) -> str:
+    """Lay the results out."""
+    none = {row["plant"]: row["energy"] for row in runs if not row["asked"]}
+    rows = []
+    for row in runs:
+        against = f"{100.0 * (row['energy'] / none[row['plant']] - 1.0):+.2f}" if row["plant"] in none else ""
+        asked = f"{100.0 * row['asked']:g}" if row["asked"] else "none"
+        rows.append((row["plant"], row["days"], asked, f"{100.0 * row['seen']:.2f}", f"{row['below']:.2f}",
+                     f"{row['energy']:.3f}", against, f"{row['cpu_seconds']:.0f}"))  # fmt: skip
+    return markdown(COLUMNS, rows)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the benchmark."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, default=Path("results/comfort_guarantee"))
+    parser.add_argument("--plants", nargs="+", default=["shop", "house", "flats"], choices=list(PLANTS))
+    parser.add_argument("--shares", nargs="+", type=float, default=[0.0, 0.05])
+    parser.add_argument("--start", default=START)
+    parser.add_argument("--days", type=int, default=DAYS)
+    parser.add_argument("--publish", action="store_true", help="replace the table between its marks")
+    options = parser.parse_args(arguments)
+    runs = []
+    try:
+        for name in options.plants:
+            for share in options.shares:
+                runs.append(perform(name, share, options.out, options.start, options.days))
+                print(f"{name} {share:g}: {100.0 * runs[-1]['seen']:.2f} % seen", flush=True)
+    except EnergyPlusError as error:
+        print(error, file=sys.stderr)
+        return 1
+    table = table_of(runs)
+    write(options.out, "comfort_guarantee", table, runs, options.publish)
+    print(table)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,99 @@
+"""Setpoints as decisions: what a zone's own controller is told for a planned load, and how much heat it has at most."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from calibration.estimation.state_space import REFERENCE
+from mpc.identify.limits import OUT_OF_REACH, HeatLimit
+from mpc.identify.model import PlantModel
+from mpc.loop.plant import Measurements
+from thermal._types import FloatArray
+
+#: A load below this is none [-], and one nearer than it to the largest is all.
+_IDLE = 0.02
+
+#: How far past the plan a setpoint is told where all heat is wanted [K]: beyond the difference of a thermostat.
+_PUSH = 0.5
+
+
+class Thermostats:
+    """Tells zones' own controllers where the air shall be at the end of the step, and learns where they cannot follow.
+
+    Their feedback is quicker than the control step, so that they take up what the model has wrong: the value is the
+    planned temperature, rather than one that is thought to cause the planned heat.
+
+    Parameters
+    ----------
+    model : PlantModel
+        Identified; of its machines those that are led by a setpoint.
+    """
+
+    def __init__(self, model: PlantModel) -> None:
+        self._model, self._limits = model, [HeatLimit(found.limits) for found in model.maps]
+        self._is_led = np.array([found.operation == "setpoint" for found in model.maps], dtype=bool)
+        self._told, self._zone = np.full(len(model.maps), np.nan), np.full(len(model.box.zones), np.nan)
+        self._served = [
+            np.array([name in found.machine.serves for name in model.box.zones], dtype=bool) for found in model.maps
+        ]
+
+    def most(self, outdoor: FloatArray) -> FloatArray:
+        """Largest loads, shape (N, n_machine) [-]: 1 of machines that are commanded.
+
+        Parameters
+        ----------
+        outdoor : ndarray, shape (N,)
+            Outdoor air [K].
+        """
+        return np.column_stack(
+            [
+                limit.at(outdoor) if led else np.ones(len(outdoor))
+                for limit, led in zip(self._limits, self._is_led, strict=True)
+            ]
+        )
+
+    def learn(self, measurements: Measurements, zone: FloatArray, outdoor: float) -> None:
+        """Take a step that has ended: what was given, where a setpoint was out of reach to its end.
+
+        Parameters
+        ----------
+        measurements : Measurements
+            Of the step.
+        zone : ndarray, shape (n_zone,)
+            Temperatures over the step [K].
+        outdoor : float
+            Outdoor air [K].
+        """
+        end = zone + 0.5 * np.nan_to_num(np.maximum(zone - self._zone, 0.0))
+        self._zone = zone
+        for k in np.flatnonzero(self._is_led & np.isfinite(self._told)):
+            found = self._model.maps[k]
+            column = found.machine.heat or found.machine.power
+            if column not in measurements or not np.isfinite(measurements[column]):
+                continue
+            load = measurements[column] / float(found.at(found.heat, 1.0, outdoor, REFERENCE))
+            missing = self._told[k] - float(np.nanmean(end[self._served[k]]))
+            if load > _IDLE and (missing > OUT_OF_REACH or load > self._limits[k].at(np.array([outdoor]))[0]):
+                self._limits[k].learn(outdoor, load)
+
+    def tell(self, k: int, level: float, most: float, end: FloatArray, edge: float) -> float:
+        """Choose a setpoint [K].
+
+        Parameters
+        ----------
+        k : int
+            Which machine.
+        level, most : float
+            Planned load, and the largest [-].
+        end : ndarray, shape (n_zone,)
+            Planned air at the end of the step [K].
+        edge : float
+            Temperature that the zone shall not fall below [K].
+        """
+        idle, full = self._model.maps[k].above
+        value = float(end[self._served[k]].mean()) + idle + min(level, 1.0) * (full - idle)
+        if level > most - _IDLE:
+            value += _PUSH
+        # a thermostat holds what it is told: told the edge it keeps the band where the model is wrong
+        self._told[k] = edge if level <= _IDLE else max(value, edge)
+        return float(self._told[k])

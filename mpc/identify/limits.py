@@ -1,0 +1,101 @@
+"""How much heat a machine gives at most over outdoor air, of machines that a zone's own controller runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from thermal._types import FloatArray
+
+#: Outdoor air that is told apart [K]: capacities of air-source machines change by some percent over it.
+BIN = 2.0
+
+#: How far a setpoint must lie above the air at the end of a step for the machine to have given all it could [K].
+OUT_OF_REACH = 0.3
+
+#: Prior of the largest load: its mean is the full load [-], where heat pumps are rated [K]; standard deviations of its
+#: level [-], of its slope [1/K] (machines of air source lose 1 to 3 % of their capacity a kelvin), of what is neither,
+#: over a length [K], as of a compressor that stops or a resistance that comes in, and of a step's reading [-].
+_MEAN, _AT = 1.0, 280.15
+_LEVEL, _SLOPE, _SHAPE, _LENGTH, _READING = 0.2, 0.02, 0.2, 5.0, 0.05
+
+#: Least load that is relied on [-].
+_LEAST = 0.1
+
+
+@dataclass
+class HeatLimit:
+    """Largest load of a machine over outdoor air, a Gaussian process that learns from steps at the limit.
+
+    What is relied on is a standard deviation below the mean (Rasmussen and Williams 2006, Gaussian processes for
+    machine learning, eq. 2.25 and 2.26): within the weather that was seen that is the load that was reached, and the
+    farther from it the less. Of each `BIN` of outdoor air the last reading counts.
+
+    Parameters
+    ----------
+    seen : iterable of tuple of float
+        Outdoor air [K] and load [-] of steps at the limit.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> limit = HeatLimit([(275.0, 1.0), (270.0, 0.9)])
+    >>> bool(limit.at(np.array([270.0]))[0] > limit.at(np.array([258.0]))[0])
+    True
+    """
+
+    seen: Iterable[tuple[float, float]] = ()
+    _bins: dict[int, tuple[float, float]] = field(default_factory=dict, init=False)
+
+    def __post_init__(self) -> None:
+        for outdoor, load in self.seen:
+            self.learn(outdoor, load)
+
+    def learn(self, outdoor: float, load: float) -> None:
+        """Take a step at the limit.
+
+        Parameters
+        ----------
+        outdoor : float
+            Outdoor air [K].
+        load : float
+            Reached [-].
+        """
+        self._bins[bin_of(outdoor)] = (outdoor, load)
+
+    def at(self, outdoor: FloatArray) -> FloatArray:
+        """Load that is relied on, shape (n,) [-].
+
+        Parameters
+        ----------
+        outdoor : ndarray, shape (n,)
+            Outdoor air [K].
+        """
+        if not self._bins:
+            return np.full(len(outdoor), _MEAN)
+        at, load = np.array([*self._bins.values()]).T
+        own = _kernel(at, at) + _READING**2 * np.eye(at.size)
+        cross, factor = _kernel(outdoor, at), cho_factor(own)
+        mean = _MEAN + cross @ cho_solve(factor, load - _MEAN)
+        prior = _LEVEL**2 + (_SLOPE * (outdoor - _AT)) ** 2 + _SHAPE**2
+        variance = prior - np.einsum("ij,ji->i", cross, cho_solve(factor, cross.T))
+        return np.asarray(np.maximum(mean - np.sqrt(np.maximum(variance, 0.0)), _LEAST))
+
+
+def bin_of(outdoor: float) -> int:
+    """Tell the bin of an outdoor temperature.
+
+    Parameters
+    ----------
+    outdoor : float
+        [K].
+    """
+    return round(outdoor / BIN)
+
+
+def _kernel(a: FloatArray, b: FloatArray) -> FloatArray:
+    straight = _LEVEL**2 + _SLOPE**2 * np.outer(a - _AT, b - _AT)
+    return np.asarray(straight + _SHAPE**2 * np.exp(-0.5 * ((a[:, None] - b) / _LENGTH) ** 2))
