@@ -21,7 +21,8 @@ import numpy as np
 from _table import markdown, write
 from simulator_speed import use_one_thread
 
-from mpc.environment.environment import ControlEnvironment, office_environment
+from mpc.environment.environment import ControlEnvironment
+from mpc.environment.office import office_environment
 
 EPISODES, STEPS = 5, 1728
 

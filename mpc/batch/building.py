@@ -103,7 +103,7 @@ class BatchedBuilding:
             for own, every in zip(self._own, self._all, strict=True):
                 own[member] = every[model]
 
-    def begin(self, gains: Array, outside: Array, free: Array) -> None:
+    def begin(self, gains: Array, outside: Array, out: Array) -> None:
         """Begin a step: readings at its end without the plant's heat, counted from the reference temperature.
 
         Parameters
@@ -112,21 +112,21 @@ class BatchedBuilding:
             Heat of people, light and equipment [W].
         outside : ndarray, shape (n_outside, member or 1)
             Boundaries counted from the reference temperature [K], then signals.
-        free : ndarray, shape (n_zone, member)
+        out : ndarray, shape (n_zone, member)
             Filled [K].
         """
         own, kept = self._own, self._free
         if self.shared:
             np.multiply(self.state, own.end[:, None], out=kept)
             np.add(kept, own.driving @ outside, out=kept)
-            np.matmul(own.output, kept, out=free)
-            np.add(free, own.response @ gains, out=free)
+            np.matmul(own.output, kept, out=out)
+            np.add(out, own.response @ gains, out=out)
             return
         np.multiply(self.state, own.end, out=kept)
         kept += _each(own.driving, outside, len(kept))
-        np.add(_each(own.output, kept.T, len(kept)).T, _each(own.response, gains, len(kept)).T, out=free)
+        np.add(_each(own.output, kept.T, len(kept)).T, _each(own.response, gains, len(kept)).T, out=out)
 
-    def finish(self, heat: Array, gains: Array, free: Array, reached: Array) -> None:
+    def finish(self, heat: Array, gains: Array, free: Array, out: Array) -> None:
         """Take the step that was begun.
 
         Parameters
@@ -135,18 +135,18 @@ class BatchedBuilding:
             Of the plant [W].
         gains, free : ndarray
             As `begin` had and gave them [W], [K].
-        reached : ndarray, shape (n_zone, member)
+        out : ndarray, shape (n_zone, member)
             Readings at the end of the step, counted from the reference temperature; filled [K].
         """
         own = self._own
         if self.shared:
             np.matmul(own.heating, heat + gains, out=self._moved)
             np.add(self._free, self._moved, out=self.state)
-            np.matmul(own.response, heat, out=reached)
+            np.matmul(own.response, heat, out=out)
         else:
             np.add(self._free, _each(own.heating, heat + gains, len(self.state)), out=self.state)
-            reached[...] = _each(own.response, heat, len(self.state)).T
-        np.add(reached, free, out=reached)
+            out[...] = _each(own.response, heat, len(self.state)).T
+        np.add(out, free, out=out)
 
 
 def _each(matrices: Array, columns: Array, members: int) -> Array:

@@ -92,7 +92,8 @@ class DrivingRows:
         self._rows = np.ascontiguousarray(np.vstack(whole), dtype=dtype)
         self._names, self._common = tuple(own), end - sum(widths[name] for name in own)
         self._own = np.zeros((members, max(lengths), end - self._common), dtype=dtype) if own else None
-        self._begin, self._numbers = np.zeros(members, dtype=np.intp), np.arange(members)
+        self._begin, self._last, self._numbers = (np.arange(members) * k for k in (0, 0, 1))
+        self._lengths = np.array(lengths)
 
     def begin(self, member: int, plant: int, own: Mapping[str, FloatArray] | None) -> None:
         """Tell which plant a member has.
@@ -104,7 +105,7 @@ class DrivingRows:
         own : mapping of str to ndarray, shape (n_steps, width), or None
             What it has for itself.
         """
-        self._begin[member] = self.first[plant]
+        self._begin[member], self._last[member] = self.first[plant], self._lengths[plant] - 1
         if self._own is not None and own is not None:
             for name in self._names:
                 part, values = self.parts[name], own[name]
@@ -121,8 +122,9 @@ class DrivingRows:
             Filled.
         """
         if not self.each:
-            out[:, 0] = self._rows[steps[0]]
+            out[:, 0] = self._rows[min(int(steps[0]), len(self._rows) - 1)]
             return
+        steps = np.minimum(steps, self._last)
         np.copyto(out[: self._common], self._rows[self._begin + steps, : self._common].T)
         if self._own is not None:
             np.copyto(out[self._common :], self._own[self._numbers, steps].T)

@@ -42,6 +42,8 @@ class BatchedPlant:
         What a step is worth, of `StepValues`; see `rewards`.
     record : bool
         Whether the run is kept, for `record`: four bytes a zone, member and step in single precision.
+    compiled : bool
+        As in `thermal.batch.program.Program`.
 
     Raises
     ------
@@ -65,6 +67,7 @@ class BatchedPlant:
         dtype: Any = np.float32,
         score: Score | None = None,
         record: bool = True,
+        compiled: bool = False,
     ) -> None:
         self.plants = checked_plants(plants)
         first, self.members, self.dtype = self.plants[0], members, np.dtype(dtype)
@@ -77,11 +80,7 @@ class BatchedPlant:
         self._random_people = any(
             not np.array_equal(p.scenario.redrawn(0).occupancy, p.scenario.redrawn(1).occupancy) for p in self.plants
         )
-        models: list[ReducedBuilding] = []
-        for plant in self.plants:
-            if not any(plant.model is m for m in models):
-                models.append(plant.model)  # type: ignore[arg-type]
-        self._model_of = np.array([[p.model is m for m in models].index(True) for p in self.plants], dtype=np.intp)
+        models, self._model_of = different_models([p.model for p in self.plants])  # type: ignore[misc]
         own = ("gains", "people", "outside") if self._random_people else ()
         self._rows = DrivingRows([plant_rows(p) for p in self.plants], members, own, dtype)
         self._building = BatchedBuilding(models, members, dtype)
@@ -89,13 +88,14 @@ class BatchedPlant:
             first, self._rows.parts, self._rows.width, self._rows.each, self.actions, self._building, score,
             len(models) > 1,
         )  # fmt: skip
-        self._program = Program(self._traced.tape, members, dtype)
+        self._program = Program(self._traced.tape, members, dtype, compiled)
         noise = first.sensors.noise
         self._noise = None if noise is None else DrawnNoise(noise, members, dtype)
         #: Which plant and seed each member has, and the number of the step that comes next, shape (member,).
         self.plant_of, self.seeds, self.now = (np.zeros(members, dtype=np.intp) for _ in range(3))
         self._started = False
-        self._longest = max(p.scenario.grid.n_steps for p in self.plants)
+        self._lengths = np.array([p.scenario.grid.n_steps for p in self.plants])
+        self._longest = int(self._lengths.max())
         self._history: tuple[Array, Array] | None = None
         self._recording = record
 
@@ -182,10 +182,9 @@ class BatchedPlant:
         }  # fmt: skip
         for name, values in columns.items():
             self._set(name)[:, who] = values[:, None]
+        several = not self._building.shared
         for name, values in (("offset", plant.loop.offset), ("response", plant.loop.local.response)):
-            self._set(name)[:, who if len(self._building_models) > 1 else 0] = (
-                values[:, None] if len(self._building_models) > 1 else values
-            )
+            self._set(name)[:, who if several else [0]] = values[:, None]
         air = warm.reading - plant.loop.offset - REFERENCE_TEMPERATURE
         self._of("zone")[:, who] = air[:, None]
         if self._history is not None:
@@ -198,17 +197,15 @@ class BatchedPlant:
                 self._noise.begin(member, seed)
             self.measured[:, member] = plant.sensors.read(last, scenario.occupancy[last.number], seed)
 
-    @property
-    def _building_models(self) -> list[int]:
-        return np.unique(self._model_of).tolist()  # type: ignore[no-any-return]
-
-    def step(self, setpoints: Array) -> Array:
+    def step(self, setpoints: Array, idle: NDArray[np.bool_] | None = None) -> Array:
         """Hold setpoints for a step of the plants.
 
         Parameters
         ----------
         setpoints : ndarray, shape (n_action, member)
             In the order of `actions` [K] or [Pa].
+        idle : ndarray of bool, shape (member,), optional
+            Members whose scenario may be over, as they will be reset: what becomes of them says nothing.
 
         Returns
         -------
@@ -231,8 +228,9 @@ class BatchedPlant:
             ends = f"{self._lowest[k, 0]:g} to {self._highest[k, 0]:g}"
             found = f"{setpoints[k].min()} to {setpoints[k].max()}"
             raise PlantActionError(f"action {self.actions[k]}", f"numbers from {ends}", found)
-        if int(self.now.max()) >= self._longest:
-            raise PlantError("scenario", "one more step", f"none of its {self._longest}", "make it longer, or reset")
+        over = self.now >= self._lengths[self.plant_of]
+        if over.any() and not (over & ~idle if idle is not None else over).sum() == 0:
+            raise PlantError("scenario", "one more step", f"none left of {over.sum()} members", "reset them")
         self._rows.fill(self.now, self._set("row"))
         if self._noise is not None:
             self._noise.fill(self.now, self._set("noise"))
@@ -249,8 +247,9 @@ class BatchedPlant:
         if (self.now == first).all():
             zones[first + 1], powers[first] = self.zone, self.powers
         else:
-            every = np.arange(self.members)
-            zones[self.now + 1, :, every], powers[self.now, :, every] = self.zone.T, self.powers.T
+            every = np.flatnonzero(self.now < self._longest)
+            at = self.now[every]
+            zones[at + 1, :, every], powers[at, :, every] = self.zone.T[every], self.powers.T[every]
 
     def record(self, member: int) -> PlantRecord:
         """Give the run of a member since its reset, for indicators.
@@ -291,6 +290,29 @@ def record_of(history: tuple[Array, Array] | None, member: int, steps: int, seco
     kept = zones[: steps + 1, :, member].astype(float) + REFERENCE_TEMPERATURE
     electricity, gas = powers[:steps, :, member].astype(float).T
     return PlantRecord(seconds, kept, electricity, gas)
+
+
+def different_models(models: Sequence[ReducedBuilding]) -> tuple[list[ReducedBuilding], IntArray]:
+    """Find which reduced buildings differ.
+
+    Parameters
+    ----------
+    models : sequence of ReducedBuilding
+        One a plant.
+
+    Returns
+    -------
+    tuple
+        Those that differ, and which of them each is.
+    """
+    found, place = list[ReducedBuilding](), list[int]()
+    for model in models:
+        mine = model.step_matrices()
+        same = [k for k, other in enumerate(found) if other is model or
+                all(np.array_equal(a, b) for a, b in zip(mine, other.step_matrices(), strict=True))]  # fmt: skip
+        place.append(same[0] if same else len(found))
+        found += [] if same else [model]
+    return found, np.array(place, dtype=np.intp)
 
 
 def checked_plants(plants: SimulatedPlant | Sequence[SimulatedPlant]) -> tuple[SimulatedPlant, ...]:

@@ -140,7 +140,7 @@ class TracedStep:
         asked = {name: given.actions[k] for k, name in enumerate(self.actions)}
         heating, cooling = self._setpoints(asked)
         runs, cycling = self._runs(ops, heating, cooling)
-        free = tape.call(self.building.begin, [part("gains"), part("outside")], (n,))[0]
+        free = tape.call(self.building.begin, [part("gains"), part("outside")], n)
         actions, supply, reach = schedule.switched(ops, asked, runs, part("ventilation")[0])
         local = LocalControl(system, given.response)  # type: ignore[arg-type]
         air = np.stack([s - REFERENCE_TEMPERATURE for s in supply]) if supply else np.zeros(0)
@@ -157,7 +157,7 @@ class TracedStep:
         before = [given.states[k] for k in range(len(system.states))]
         done = advance(ops, system, before, calls, conditions, actions, plant.scenario.grid.step * 1.0)
         heat = system.at_zones(ops, done.results)
-        reached = tape.call(self.building.finish, [heat, part("gains"), free], (n,))[0]
+        reached = tape.call(self.building.finish, [heat, part("gains"), free], n)
         mean = 0.5 * (given.reading + reached) + REFERENCE_TEMPERATURE
         step = PlantStep(0, conditions, actions, done, mean, reached)
         measured = plant.sensors.exact(ops, step, part("weather"), part("people"))

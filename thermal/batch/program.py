@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Callable, Sequence
+from functools import partial
+from itertools import groupby
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal.batch.compiled import compile_run, compiles
 from thermal.batch.trace import Instruction, Slot, Tape, Traced, View
 from thermal.errors import ModelError
+
+_LINE = 64  # bytes of a cache line, which arrays begin at
 
 
 class Program:
@@ -23,6 +29,9 @@ class Program:
         How many there are.
     dtype : type
         ``numpy.float64``, or ``numpy.float32``, which is twice as fast.
+    compiled : bool
+        Whether numba compiles runs of plain arithmetic (extra ``[fast]``), which takes some seconds; otherwise each
+        instruction is a call of NumPy.
 
     Notes
     -----
@@ -30,39 +39,25 @@ class Program:
     processor's cache; an instruction on elements may write where one of its inputs lies.
     """
 
-    def __init__(self, tape: Tape, members: int, dtype: Any = np.float64) -> None:
+    def __init__(self, tape: Tape, members: int, dtype: Any = np.float64, compiled: bool = False) -> None:
         ModelError.unless(members >= 1, "batch", "1 member or more", repr(members))
-        self.members, self.dtype = members, np.dtype(dtype)
+        self.members, self.dtype, self._compiled = members, np.dtype(dtype), compiled
         notes = _needed(tape)
-        self._arrays: dict[int, NDArray[Any]] = {k: self._array(tape.slots[k]) for k in tape.kept}
-        last = {v.slot.number: n for n, note in enumerate(notes) for v in _views(note)}
-        free: dict[Any, list[NDArray[Any]]] = defaultdict(list)
-        self._code: list[tuple[Any, tuple[Any, ...]]] = []
-        for n, note in enumerate(notes):
-            ending = {v.slot.number: v.slot for v in _views(note) if last[v.slot.number] == n}
-            elementwise = isinstance(note.function, np.ufunc) and note.function is not np.matmul
-            inputs = {v.slot.number for v in note.inputs if isinstance(v, View)}
-            released = [s for k, s in ending.items() if k in inputs and k not in tape.kept and k != note.output.slot.number]
-            for view in (v for v in note.inputs if isinstance(v, View) and v.slot.number not in self._arrays):
-                self._arrays[view.slot.number] = self._array(view.slot)  # further outputs of a call
-            arrays = [self._operand(v) for v in note.inputs]
-            if elementwise:
-                for slot in released:
-                    free[_form(slot)].append(self._arrays[slot.number])
-            slot = note.output.slot
-            if slot.number not in self._arrays:
-                spare = free[_form(slot)]
-                self._arrays[slot.number] = spare.pop() if spare else self._array(slot)
-            self._code.append((note.function, (*arrays, self._operand(note.output))))
-            if not elementwise:
-                for slot in released:
-                    free[_form(slot)].append(self._arrays[slot.number])
-            own = note.output.slot
-            if last[own.number] == n and own.number not in tape.kept:
-                free[_form(own)].append(self._arrays[own.number])
+        notes = _grouped(notes) if compiled else notes
+        self._work, self._end = self._memory(tape, notes), 0
+        self._arrays: dict[int, NDArray[Any]] = {k: self._array(tape.slots[k]) for k in sorted(tape.kept)}
+        self._constants: dict[Any, NDArray[Any]] = {}
+        run = self._laid_out(tape, notes)
+        self._count, self._code = len(run), list[Callable[[], Any]]()
+        for plain, part in groupby(run, key=lambda step: compiled and compiles(step[0])):
+            steps = list(part)
+            if plain:
+                self._code += compile_run(self._work, steps)
+            else:
+                self._code += [partial(function, *inputs, out=output) for function, inputs, output in steps]
 
     def __len__(self) -> int:
-        return len(self._code)
+        return self._count
 
     def of(self, value: Traced) -> NDArray[Any]:
         """Give the array of a kept value, to read or to set.
@@ -76,12 +71,59 @@ class Program:
 
     def run(self) -> None:
         """Carry out everything once."""
-        for function, operands in self._code:
-            function(*operands)
+        for instruction in self._code:
+            instruction()
+
+    def _laid_out(
+        self, tape: Tape, notes: Sequence[Instruction]
+    ) -> list[tuple[Any, tuple[Any, ...], NDArray[Any]]]:
+        """Give each value a place for as long as it is needed."""
+        last = {v.slot.number: n for n, note in enumerate(notes) for v in _views(note)}
+        free: dict[Any, list[NDArray[Any]]] = defaultdict(list)
+        run = []
+        for n, note in enumerate(notes):
+            inputs = {v.slot.number: v.slot for v in note.inputs if isinstance(v, View)}
+            own = note.output.slot
+            ended = [s for k, s in inputs.items() if last[k] == n and k not in tape.kept and k != own.number]
+            operands = tuple(self._operand(v) for v in note.inputs)
+            in_place = isinstance(note.function, np.ufunc) and note.function is not np.matmul
+            if not in_place and own.number not in self._arrays:
+                self._arrays[own.number] = self._place(own, free)
+            for slot in ended:
+                free[_form(slot)].append(self._arrays[slot.number])
+            if own.number not in self._arrays:
+                self._arrays[own.number] = self._place(own, free)
+            run.append((note.function, operands, self._operand(note.output)))
+            if last[own.number] == n and own.number not in tape.kept:
+                free[_form(own)].append(self._arrays[own.number])
+        return run
+
+    def _place(self, slot: Slot, free: dict[Any, list[NDArray[Any]]]) -> NDArray[Any]:
+        spare = free[_form(slot)]
+        return spare.pop() if spare else self._array(slot)
+
+    def _memory(self, tape: Tape, notes: Sequence[Instruction]) -> NDArray[Any]:
+        """Memory for all values, were none to take another's place; what is not used costs nothing."""
+        numbers = {v.slot.number for note in notes for v in _views(note)} | tape.kept
+        values = sum(self._room(self._shape(tape.slots[k])) for k in numbers)
+        arrays = (v for note in notes for v in note.inputs if isinstance(v, np.ndarray))
+        return np.zeros(values + sum(self._room(v.shape) for v in arrays) + _LINE, dtype=self.dtype)
+
+    def _shape(self, slot: Slot) -> tuple[int, ...]:
+        return (*slot.shape, self.members if slot.each else 1)
+
+    def _room(self, shape: tuple[int, ...]) -> int:
+        line = _LINE // self.dtype.itemsize
+        return -(-int(np.prod(shape)) // line) * line
 
     def _array(self, slot: Slot) -> NDArray[Any]:
-        shape = (*slot.shape, self.members if slot.each else 1)
-        return np.zeros(shape, dtype=bool if slot.truth else self.dtype)
+        if slot.truth and not self._compiled:
+            return np.zeros(self._shape(slot), dtype=bool)
+        return self._take(self._shape(slot))
+
+    def _take(self, shape: tuple[int, ...]) -> NDArray[Any]:
+        begin, self._end = self._end, self._end + self._room(shape)
+        return self._work[begin : begin + int(np.prod(shape))].reshape(shape)
 
     def _operand(self, operand: Any) -> Any:
         if isinstance(operand, View):
@@ -89,9 +131,13 @@ class Program:
             for index in operand.path:
                 array = array[index]
             return array
-        if isinstance(operand, np.ndarray) and operand.dtype != bool:
-            return operand.astype(self.dtype)
-        return operand
+        if not isinstance(operand, np.ndarray):
+            return operand
+        key = id(operand)
+        if key not in self._constants:
+            self._constants[key] = self._take(operand.shape)
+            self._constants[key][...] = operand
+        return self._constants[key]
 
 
 def _form(slot: Slot) -> tuple[Any, ...]:
@@ -110,3 +156,22 @@ def _needed(tape: Tape) -> list[Instruction]:
             wanted |= {v.slot.number for v in note.inputs if isinstance(v, View)}
             found.append(note)
     return found[::-1]
+
+
+def _grouped(notes: Sequence[Instruction]) -> list[Instruction]:
+    """Order instructions so that plain arithmetic comes in few long runs; none passes what it depends on."""
+    left, done, plain = list(notes), list[Instruction](), True
+    while left:
+        waiting, read, written = list[Instruction](), set[int](), set[int]()
+        for note in left:
+            takes = {v.slot.number for v in note.inputs if isinstance(v, View)}
+            gives = note.output.slot.number
+            free = not (takes & written) and gives not in written and gives not in read
+            if free and compiles(note.function) == plain:
+                done.append(note)
+            else:
+                waiting.append(note)
+                read |= takes
+                written.add(gives)
+        left, plain = waiting, not plain
+    return done

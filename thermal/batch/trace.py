@@ -64,7 +64,7 @@ class Instruction(NamedTuple):
     Parameters
     ----------
     function : callable
-        Called with the inputs and then the output.
+        Called with the inputs, and with the output as ``out``.
     inputs : tuple
         Views, arrays whose last axis is of members or one, or plain numbers.
     output : View
@@ -130,22 +130,21 @@ class Tape:
         result[...] = value
         return result
 
-    def call(self, function: Callable[..., Any], inputs: Sequence[Any], *shapes: tuple[int, ...]) -> list[Traced]:
-        """Note a function that is no operation on elements: called with arrays of all inputs, then all outputs.
+    def call(self, function: Callable[..., Any], inputs: Sequence[Any], *shape: int) -> Traced:
+        """Note a function that is no operation on elements.
 
         Parameters
         ----------
         function : callable
-            Fills its outputs; a last axis is of members, or of length one.
+            Called with arrays of all inputs, and of its output as ``out``; a last axis is of members, or of length one.
         inputs : sequence
             Traced values.
-        *shapes : tuple of int
-            Of the outputs, of one member.
+        *shape : int
+            Of the output, of one member.
         """
-        outputs = [self.value(*shape, kept=False) for shape in shapes]
-        views = tuple(self.operand(v) for v in (*inputs, *outputs[1:]))
-        self.notes.append(Instruction(function, views, outputs[0].view, True))
-        return outputs
+        output = self.value(*shape, kept=False)
+        self.notes.append(Instruction(function, tuple(self.operand(v) for v in inputs), output.view, True))
+        return output
 
     def _slot(self, shape: tuple[int, ...], each: bool, truth: bool) -> Traced:
         slot = Slot(len(self.slots), tuple(shape), each, truth)
@@ -173,7 +172,7 @@ class Tape:
         Parameters
         ----------
         function : callable
-            Called with the inputs and the output.
+            Called with the inputs, and with the output as ``out``.
         inputs : sequence
             Traced values, arrays with an axis of members, or numbers.
         shape : tuple of int
@@ -271,6 +270,8 @@ class Traced(NDArrayOperatorsMixin):
             raise ModelError("batch", "plain functions of arrays", f"numpy.{ufunc.__name__}: {method} {list(options)}")
         if ufunc is np.matmul:
             return self._product(*inputs)
+        if ufunc is np.power and isinstance(inputs[1], int | float) and inputs[1] == 2:
+            return inputs[0] * inputs[0]
         shape = np.broadcast_shapes(*(v.shape if isinstance(v, Traced) else np.shape(v) for v in inputs))
         operands = [v if isinstance(v, Traced) else self.tape.operand(v) for v in inputs]
         if ufunc not in _OF_TRUTHS:  # numbers of 0 and 1, in the precision of the rest
