@@ -271,7 +271,7 @@ class ActionLayout:
         valid = values.ndim == 2 and values.shape[1] == len(self) and bool((np.abs(values) <= _LARGEST).all())
         if not valid:  # NaN is in no range
             expected = f"rows of {len(self)} numbers from -1 to 1, for {', '.join(self.chosen)}"
-            raise PlantActionError("action", expected, f"shape {values.shape}, {np.nanmin(values)} to {np.nanmax(values)}")
+            raise PlantActionError("action", expected, f"shape {values.shape}, {values.min()} to {values.max()}")
         shares = np.clip(0.5 * (values.T + 1.0), 0.0, 1.0)
         each = self.lowest[:, None] + (self.highest - self.lowest)[:, None] * shares
         return np.asarray(np.repeat(each, [len(names) for names, _, _ in self._groups], axis=0))

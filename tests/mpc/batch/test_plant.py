@@ -84,23 +84,19 @@ def test_a_week_is_that_of_the_single_plant(dtype: Any, bound: float) -> None:
 
 
 def test_members_differ_in_weather_people_and_building() -> None:
-    effects = chosen(["window_sun"]) if "window_sun" in _known() else ()
-    people = RandomOccupancy(3.0)
+    settings = {"occupancy": RandomOccupancy(3.0), "effects": chosen(["solar_gain"])}
     plants = [
-        plant_of("2023-01-09", 2, occupancy=people),
-        plant_of("2023-07-10", 2, occupancy=people, parameters={"u_facade": 0.9} if _has("u_facade") else None),
+        plant_of("2023-01-09", 2, parameters={"window_u_value": 1.5}, **settings),
+        plant_of("2023-07-10", 2, parameters={"window_u_value": 3.0}, **settings | {"order": 26}),
     ]
     batch = BatchedPlant(plants, 4, dtype=np.float64)
-    assert not effects or effects
     assert follow(batch, [0, 1, 1, 0], [3, 3, 4, 5], 300) <= EXACT
-
-
-def _known() -> set[str]:
-    return set()
-
-
-def _has(name: str) -> bool:
-    return name in {p.name for p in plant_of(days=1).model.network.parameters}
+    batch.reset([3, 3, 3, 4], [0, 0, 1, 0])
+    for row in setpoints(plants[0], 100, 1):
+        batch.step(np.repeat(row, 4, axis=1))
+    zone = batch.zone_temperature
+    np.testing.assert_array_equal(zone[:, 0], zone[:, 1])
+    assert np.abs(zone[:, 0] - zone[:, 2]).max() > 0.1 and np.abs(zone[:, 0] - zone[:, 3]).max() > 1e-3
 
 
 def test_members_may_start_anew_alone() -> None:
