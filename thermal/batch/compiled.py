@@ -21,8 +21,13 @@ _EXPRESSIONS: dict[Any, str] = {
     _copy: "{0}", _where: "{1} if {0} != zero else {2}",
 }  # fmt: skip
 
-#: Instructions in a function: compilers take more than twice as long for twice as many.
-_TOGETHER = 80
+#: Instructions in a function, and in a loop: compilers take more than twice as long for twice as many.
+_TOGETHER, _IN_LOOP = 240, 60
+
+#: Function, inputs and output.
+Instruction = tuple[Any, tuple[Any, ...], NDArray[Any]]
+#: Where an array begins, and its strides, in elements.
+Place = tuple[int, tuple[int, ...]]
 
 
 def compiles(function: Any) -> bool:
@@ -37,7 +42,7 @@ def compiles(function: Any) -> bool:
 
 
 def compile_run(
-    work: NDArray[Any], run: Sequence[tuple[Any, tuple[Any, ...], NDArray[Any]]]
+    work: NDArray[Any], run: Sequence[Instruction]
 ) -> list[Callable[[], Any]]:
     """Compile instructions that follow each other.
 
@@ -64,8 +69,8 @@ def compile_run(
         numbers = sorted({float(v) for _, inputs, _ in part for v in inputs if not isinstance(v, np.ndarray)})
         names = {number: f"c{k}" for k, number in enumerate(numbers)}
         lines = [f"    c{k} = numbers[{k}]" for k in range(len(numbers))]
-        for function, inputs, output in part:
-            lines += _loop(work, function, inputs, output, names)
+        for together in _loops(work, part):
+            lines += _loop(work, together, names)
         text = "def run(w, numbers, zero, one):\n" + "\n".join(lines) + "\n"
         scope: dict[str, Any] = {"np": np}
         exec(compile(text, "<thermal.batch.compiled>", "exec"), scope)  # noqa: S102 - text of numbers and templates alone
@@ -81,26 +86,53 @@ def _bound(function: Any, arguments: tuple[Any, ...]) -> Callable[[], Any]:
     return lambda: function(*arguments)
 
 
-def _loop(
-    work: NDArray[Any], function: Any, inputs: Sequence[Any], output: NDArray[Any], names: dict[float, str]
-) -> list[str]:
-    """Write the loop of an instruction over all elements of its output."""
-    shape, terms = output.shape, []
-    arrays = [np.broadcast_to(v, shape) if isinstance(v, np.ndarray) else None for v in inputs]
-    places = [*((work_place(work, a) if a is not None else None) for a in arrays), work_place(work, output)]
-    axes = _merged(shape, [p for p in places if p is not None])
-    for value, place in zip(inputs, places[:-1], strict=True):
-        terms.append(names[float(value)] if place is None else f"w[{_index(place, axes)}]")
-    lines = [f"{'    ' * (k + 1)}for i{k} in range({length}):" for k, (length, _) in enumerate(axes)]
-    expression = _EXPRESSIONS[function].format(*(f"a{k}" for k in range(len(terms))))
-    inner = "    " * (len(axes) + 1)
-    lines += [f"{inner}a{k} = {term}" for k, term in enumerate(terms)]
-    place = places[-1]
-    assert place is not None
-    return [*lines, f"{inner}w[{_index(place, axes)}] = {expression}"]
+def _loops(work: NDArray[Any], run: Sequence[Instruction]) -> list[list[Instruction]]:
+    """Put instructions over the same axes into one loop, as long as none reads or writes what another element has."""
+    found: list[list[Instruction]] = []
+    touched, written, axes = list[Place](), list[Place](), ()
+    for function, inputs, output in run:
+        shape = output.shape
+        reads = [work_place(work, np.broadcast_to(v, shape)) for v in inputs if isinstance(v, np.ndarray)]
+        target = work_place(work, output)
+        apart = all(not _overlap(shape, place, target) or place == target for place in touched)
+        apart &= all(not _overlap(shape, place, read) or place == read for place in written for read in reads)
+        if not found or axes != shape or not apart or len(found[-1]) >= _IN_LOOP:
+            found.append([])
+            touched, written, axes = [], [], shape
+        found[-1].append((function, inputs, output))
+        touched += [*reads, target]
+        written.append(target)
+    return found
 
 
-Place = tuple[int, tuple[int, ...]]
+def _overlap(shape: tuple[int, ...], one: Place, other: Place) -> bool:
+    """Tell whether two places may share an element."""
+    ends = [begin + sum((n - 1) * s for n, s in zip(shape, strides, strict=True)) for begin, strides in (one, other)]
+    return one[0] <= ends[1] and other[0] <= ends[0]
+
+
+def _loop(work: NDArray[Any], together: Sequence[Instruction], names: dict[float, str]) -> list[str]:
+    """Write one loop over all elements of the outputs of some instructions."""
+    shape = together[0][2].shape
+    axes = [k for k, length in enumerate(shape) if length > 1] or [len(shape) - 1]
+    lines = [f"{'    ' * (depth + 1)}for i{k} in range({shape[k]}):" for depth, k in enumerate(axes)]
+    inner, known = "    " * (len(axes) + 1), dict[Place, str]()
+    for function, inputs, output in together:
+        terms = []
+        for value in inputs:
+            if not isinstance(value, np.ndarray):
+                terms.append(names[float(value)])
+                continue
+            place = work_place(work, np.broadcast_to(value, shape))
+            if place not in known:
+                known[place] = f"a{len(known)}"
+                lines.append(f"{inner}{known[place]} = w[{_index(place, axes)}]")
+            terms.append(known[place])
+        target = work_place(work, output)
+        name = known.setdefault(target, f"a{len(known)}")
+        lines.append(f"{inner}{name} = {_EXPRESSIONS[function].format(*terms)}")
+        lines.append(f"{inner}w[{_index(target, axes)}] = {name}")
+    return lines
 
 
 def work_place(work: NDArray[Any], array: NDArray[Any]) -> Place:
@@ -117,21 +149,7 @@ def work_place(work: NDArray[Any], array: NDArray[Any]) -> Place:
     return begin, tuple(s // work.itemsize for s in array.strides)
 
 
-def _merged(shape: tuple[int, ...], places: Sequence[Place]) -> list[tuple[int, tuple[int, ...]]]:
-    """Axes to loop over, each with its length and the axes that it stands for; neighbours that lie in line are one."""
-    axes: list[tuple[int, tuple[int, ...]]] = []
-    for k, length in enumerate(shape):
-        if length == 1 and len(shape) > 1:
-            continue
-        if axes and all(strides[axes[-1][1][-1]] == strides[k] * length for _, strides in places):
-            axes[-1] = (axes[-1][0] * length, (*axes[-1][1], k))
-        else:
-            axes.append((length, (k,)))
-    return axes or [(1, (len(shape) - 1,))]
-
-
-def _index(place: Place, axes: Sequence[tuple[int, tuple[int, ...]]]) -> str:
+def _index(place: Place, axes: Sequence[int]) -> str:
     begin, strides = place
-    terms = [f"i{k}" if strides[of[-1]] == 1 else f"{strides[of[-1]]} * i{k}" for k, (_, of) in enumerate(axes)
-             if strides[of[-1]]]  # fmt: skip
+    terms = [f"i{k}" if strides[k] == 1 else f"{strides[k]} * i{k}" for k in axes if strides[k]]
     return " + ".join([str(begin), *terms])
