@@ -1,4 +1,4 @@
-"""Steps of the learning environment a second: an office on its reduced model, one core; one, a loop of some, and many at once.
+"""Steps of the learning environment a second: an office on its reduced model, one by one and many at once, one core.
 
 A step is 5 minutes of the plant under random actions of a seed, its measurements with noise, the forecast, the clock
 and the reward. Beside it the plant alone, and the plant with its measurements read; a loop of single environments; the

@@ -69,8 +69,8 @@ class BatchedBuilding:
 
     Notes
     -----
-    Of one building all members are columns of the products. Where members have different ones each has modes of its own:
-    a stack of matrices, each times a vector, so that a step reads them all from memory (measured by
+    Of one building all members are columns of the products. Where members have different ones each has modes of its
+    own: a stack of matrices, each times a vector, so that a step reads them all from memory (measured by
     ``benchmarks/environment_speed.py``).
     """
 
@@ -150,7 +150,7 @@ class BatchedBuilding:
 
 
 def _each(matrices: Array, columns: Array, members: int) -> Array:
-    """Times each member's column its own matrix, shape (member, n)."""
+    """Multiply each member's column by its own matrix, shape (member, n)."""
     rows = np.ascontiguousarray(np.broadcast_to(columns, (columns.shape[0], members)).T)
     product: Array = np.matmul(matrices, rows[:, :, None])[:, :, 0]
     return product

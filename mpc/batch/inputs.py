@@ -147,6 +147,7 @@ class DrawnNoise:
         self.source, self._seeds = source, np.zeros(members, dtype=np.int64)
         self._numbers = np.full(members, -1, dtype=np.int64)
         self._drawn = np.zeros((BLOCK, source.width, members), dtype=dtype)
+        self._few = np.zeros((_TOGETHER, BLOCK * source.width), dtype=dtype)
         self._members = np.arange(members)
 
     def begin(self, member: int, seed: int) -> None:
@@ -180,7 +181,9 @@ class DrawnNoise:
     def _draw(self, members: IntArray, numbers: IntArray) -> None:
         for part in (members[k : k + _TOGETHER] for k in range(0, len(members), _TOGETHER)):
             seeds = self._seeds[part].tolist()
-            drawn = [self.source.block(n, seed) for n, seed in zip(numbers[part].tolist(), seeds, strict=True)]
+            for row, (number, seed) in enumerate(zip(numbers[part].tolist(), seeds, strict=True)):
+                self._few[row] = self.source.block(number, seed).ravel()
+            columns = self._drawn.reshape(-1, self._drawn.shape[-1])
             together = part[0] + len(part) - 1 == part[-1]
-            self._drawn[:, :, slice(part[0], part[-1] + 1) if together else part] = np.moveaxis(np.array(drawn), 0, -1)
+            columns[:, slice(part[0], part[-1] + 1) if together else part] = self._few[: len(part)].T
         self._numbers[members] = numbers[members]

@@ -35,8 +35,8 @@ class StepInputs:
     noise : Traced, shape (n_noise,)
         Random numbers [-].
     reading, missed, offset, response : Traced, shape (n_zone,)
-        Readings of the zones' sensors at the start, counted from the reference temperature [K]; what local control missed
-        [K]; what sensors say too much [K]; rise over a step to heat [K/W].
+        Readings of the zones' sensors at the start, counted from the reference temperature [K]; what local control
+        missed [K]; what sensors say too much [K]; rise over a step to heat [K/W].
     cycling : Traced, shape (n_air_handler,)
         1 for those that run since a zone has drifted [-].
     states : Traced, shape (n_state,)

@@ -46,8 +46,8 @@ class RenderedRun:
         zone = self.record.zone_temperature[-1] - _FREEZING
         lower, upper = (edge[row] - _FREEZING for edge in (self.scenario.lower, self.scenario.upper))
         gas = 0.0 if self.record.gas is None else float(self.record.gas[-1])
-        lines = [f"{stamp:%Y-%m-%d %H:%M}  electricity {self.record.electricity[-1] / 1e3:.2f} kW  gas {gas / 1e3:.2f} kW",
-                 f"{'zone':<16} {'degC':>6} {'from':>6} {'to':>6}"]  # fmt: skip
+        power = f"electricity {self.record.electricity[-1] / 1e3:.2f} kW  gas {gas / 1e3:.2f} kW"
+        lines = [f"{stamp:%Y-%m-%d %H:%M}  {power}", f"{'zone':<16} {'degC':>6} {'from':>6} {'to':>6}"]
         lines += [
             f"{name:<16} {t:6.2f} {low:6.2f} {high:6.2f}{'' if low <= t <= high else '  outside'}"
             for name, t, low, high in zip(self.zones, zone, lower, upper, strict=True)

@@ -74,8 +74,8 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Observation, NDArray[np.float
     num_envs : int
         How many.
     autoreset_mode : gymnasium.vector.AutoresetMode
-        ``NEXT_STEP`` (default): the step after an episode's last one resets. ``SAME_STEP``: an episode's last step does,
-        and ``infos["final_obs"]`` and ``infos["final_info"]`` have what it saw.
+        ``NEXT_STEP`` (default): the step after an episode's last one resets. ``SAME_STEP``: an episode's last step
+        does, and ``infos["final_obs"]`` and ``infos["final_info"]`` have what it saw.
     dtype : type
         Precision of the plants, ``numpy.float32`` (default) or ``numpy.float64``; observations are in single precision.
     compiled : bool
@@ -272,9 +272,10 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Observation, NDArray[np.float
         zones, powers = batch.history or (np.zeros(0), np.zeros(0))
         for k in who.tolist():
             # what goes on in the place of a member that is reset alone must not change its indicators
-            own = (zones, powers, k) if all_at_once else (zones[:, :, k : k + 1].copy(), powers[:, :, k : k + 1].copy(), 0)
-            plant = batch.plants[int(batch.plant_of[k])]
-            found[k] = EpisodeKpis(plant, own[:2], own[2], int(batch.now[k]), int(batch.seeds[k]))
+            mine = slice(k, k + 1)
+            kept = (zones, powers) if all_at_once else (zones[:, :, mine].copy(), powers[:, :, mine].copy())
+            plant, place = batch.plants[int(batch.plant_of[k])], k if all_at_once else 0
+            found[k] = EpisodeKpis(plant, kept, place, int(batch.now[k]), int(batch.seeds[k]))
         return {"kpis": found, "_kpis": mask}
 
     def _observe(self, measured: NDArray[Any]) -> Observation:

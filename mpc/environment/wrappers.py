@@ -87,8 +87,8 @@ class DiscreteVectorActions(gymnasium.vector.VectorActionWrapper):
 class NormalizedObservations(gymnasium.ObservationWrapper[Observation, Any, Observation]):
     """Observations less a mean, over a standard deviation, both fixed beforehand.
 
-    The ranges of an environment are physical and wide; what a building does in them is narrow. Statistics are those of a
-    sample, `NormalizedObservations.measured`, and do not move afterwards: a policy can be moved with its numbers.
+    The ranges of an environment are physical and wide; what a building does in them is narrow. Statistics are those of
+    a sample, `NormalizedObservations.measured`, and do not move afterwards: a policy can be moved with its numbers.
 
     Parameters
     ----------
@@ -104,7 +104,8 @@ class NormalizedObservations(gymnasium.ObservationWrapper[Observation, Any, Obse
         fits = np.shape(mean) == shape == np.shape(deviation) and bool((np.asarray(deviation) >= 0.0).all())
         MpcError.unless(fits, "normalization", f"mean and deviation of shape {shape}", f"{np.shape(mean)}")
         self.mean = np.asarray(mean, dtype=np.float32)
-        self._factor = np.where(np.asarray(deviation) > _LEAST, 1.0 / np.maximum(deviation, _LEAST), 0.0).astype(np.float32)
+        moving = np.asarray(deviation) > _LEAST
+        self._factor = np.where(moving, 1.0 / np.maximum(deviation, _LEAST), 0.0).astype(np.float32)
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, shape, np.float32)
 
     @classmethod

@@ -141,7 +141,7 @@ class LocalControl:
 
     @staticmethod
     def missing(missed: Value, reached: Value, rest: Value) -> Value:
-        """What the next step is to make up for [K].
+        """Give what the next step is to make up for [K].
 
         Parameters
         ----------

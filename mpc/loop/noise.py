@@ -69,7 +69,7 @@ class NoiseSource:
 
     @cached_property
     def _groups(self) -> list[tuple[NDArray[np.intp], NDArray[np.intp], float, float, float]]:
-        """Columns with noise, which random numbers are theirs, absolute and relative deviation, and steps they count in."""
+        """Columns with noise, which random numbers are theirs, absolute and relative deviation, steps they count in."""
         noise = self.noise
         by = {"temperature": (noise.temperature, 0.0), "air_flow": (0.0, noise.flow), "power": (0.0, noise.power),
               "pressure": (0.0, noise.pressure)}  # fmt: skip

@@ -1,4 +1,4 @@
-"""Runs of plain arithmetic of a program, compiled by numba (extra ``[fast]``): no call of NumPy between two instructions."""
+"""Runs of plain arithmetic of a program, compiled by numba (extra ``[fast]``)."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -41,9 +41,7 @@ def compiles(function: Any) -> bool:
     return function in _EXPRESSIONS
 
 
-def compile_run(
-    work: NDArray[Any], run: Sequence[Instruction]
-) -> list[Callable[[], Any]]:
+def compile_run(work: NDArray[Any], run: Sequence[Instruction]) -> list[Callable[[], Any]]:
     """Compile instructions that follow each other.
 
     Parameters
@@ -73,7 +71,7 @@ def compile_run(
             lines += _loop(work, together, names)
         text = "def run(w, numbers, zero, one):\n" + "\n".join(lines) + "\n"
         scope: dict[str, Any] = {"np": np}
-        exec(compile(text, "<thermal.batch.compiled>", "exec"), scope)  # noqa: S102 - text of numbers and templates alone
+        exec(compile(text, "<thermal.batch.compiled>", "exec"), scope)  # text of numbers and templates alone
         kind = numba.from_dtype(work.dtype)
         signature = numba.void(kind[::1], kind[::1], kind, kind)
         compiled = numba.njit(signature, error_model="numpy")(scope["run"])
@@ -89,14 +87,16 @@ def _bound(function: Any, arguments: tuple[Any, ...]) -> Callable[[], Any]:
 def _loops(work: NDArray[Any], run: Sequence[Instruction]) -> list[list[Instruction]]:
     """Put instructions over the same axes into one loop, as long as none reads or writes what another element has."""
     found: list[list[Instruction]] = []
-    touched, written, axes = list[Place](), list[Place](), ()
+    touched, written = list[Place](), list[Place]()
+    axes: tuple[int, ...] = ()
     for function, inputs, output in run:
         shape = output.shape
         reads = [work_place(work, np.broadcast_to(v, shape)) for v in inputs if isinstance(v, np.ndarray)]
         target = work_place(work, output)
-        apart = all(not _overlap(shape, place, target) or place == target for place in touched)
-        apart &= all(not _overlap(shape, place, read) or place == read for place in written for read in reads)
-        if not found or axes != shape or not apart or len(found[-1]) >= _IN_LOOP:
+        fits = bool(found) and axes == shape and len(found[-1]) < _IN_LOOP
+        fits = fits and all(not _overlap(shape, place, target) or place == target for place in touched)
+        fits = fits and all(not _overlap(shape, w, read) or w == read for w in written for read in reads)
+        if not fits:
             found.append([])
             touched, written, axes = [], [], shape
         found[-1].append((function, inputs, output))

@@ -1,9 +1,10 @@
 """Values that write down what is done with them: equations of one member become a program for many.
 
-An equation that is written for one building - floats for what there is one of, arrays over zones or terminals - is called
-once with traced values. They take part in NumPy's protocols for functions of arrays, so that each operation is noted in a
-`Tape` instead of being carried out. `thermal.batch.program.Program` then carries the notes out on arrays that have one
-axis more, the last: the members. This is what other libraries call a vectorising map; no equation is written twice.
+An equation that is written for one building - floats for what there is one of, arrays over zones or terminals - is
+called once with traced values. They take part in NumPy's protocols for functions of arrays, so that each operation is
+noted in a `Tape` instead of being carried out. `thermal.batch.program.Program` then carries the notes out on arrays
+that have one axis more, the last: the members. This is what other libraries call a vectorising map; no equation is
+written twice.
 """
 
 from __future__ import annotations
@@ -290,7 +291,8 @@ class Traced(NDArrayOperatorsMixin):
             return _joined(self.tape, parts, function is np.stack)
         if function is np.broadcast_arrays:
             return args
-        raise ModelError("batch", "functions that a trace knows", f"numpy.{function.__name__}", "see thermal.batch.trace")
+        advice = "see thermal.batch.trace"
+        raise ModelError("batch", "functions that a trace knows", f"numpy.{function.__name__}", advice)
 
     def number(self) -> Traced:
         """Give 1 for true and 0 for false; what is a number stays as it is."""
@@ -308,7 +310,7 @@ class Traced(NDArrayOperatorsMixin):
 
     def __getitem__(self, index: Any) -> Any:
         if isinstance(index, np.ndarray | list):
-            rows = [int(k) for k in np.flatnonzero(index)] if np.asarray(index).dtype == bool else [int(k) for k in index]
+            rows = [int(k) for k in (np.flatnonzero(index) if np.asarray(index).dtype == bool else index)]
             whole = range(rows[0], rows[0] + len(rows)) if rows else range(0)
             if rows and rows == list(whole):
                 return self[whole.start : whole.stop]
