@@ -95,17 +95,18 @@ def compare(zones: int, steps: int, members: int, compiled: bool) -> dict[str, f
     few = [office_environment(office=OFFICES[zones], plant=settings) for _ in range(4)] if zones < 50 else [single]
     found[f"loop of {len(few)} environments"] = loop_of(few, max(steps // 4, 20))
     long = max(64 * (steps // 512), 64)
-    plants = list(single.plants)
-    found[f"{members} at once"] = many_at_once(VectorEnvironment(plants, members), long)
+    found[f"{members} at once"] = many_at_once(VectorEnvironment(single, members), long)
     if compiled:
         begin = time.process_time()
-        world = VectorEnvironment(plants, members, compiled=True)
+        world = VectorEnvironment(single, members, compiled=True)
         found["making it, compiled [CPU s]"] = time.process_time() - begin
         found[f"{members} at once, compiled"] = many_at_once(world, long)
     values = [{"window_u_value": u} for u in (2.0, 3.0)]
     own = [p for v in values for p in office_plants(OFFICES[zones], PlantSettings(
         dx=1.0, noise=SensorNoise(), parameters=v), ("2023-01-09",), 7)]  # fmt: skip
-    found[f"{members} at once, a building for each"] = many_at_once(VectorEnvironment(own, members), 64, 1)
+    found[f"{members} at once, a building for each"] = many_at_once(
+        VectorEnvironment(ControlEnvironment(own), members), 64, 1
+    )
     return found
 
 

@@ -91,7 +91,7 @@ class BatchedBuilding:
         members, models : ndarray of int, shape (n,)
             Which members, and which building each has.
         states : sequence of ndarray, shape (r,)
-            One a building.
+            One a building [-].
         """
         for member, model in zip(members.tolist(), models.tolist(), strict=True):
             row = np.zeros(self._all.end.shape[1])

@@ -4,14 +4,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mpc.batch.building import Array
 from mpc.loop.noise import BLOCK, NoiseSource
 from mpc.loop.simulated import SimulatedPlant
 from thermal._types import FloatArray, IntArray
 from thermal.units import REFERENCE_TEMPERATURE
-
-Array = NDArray[Any]
 
 _TOGETHER = 32  # members whose noise is laid out together, so that what is drawn stays in the cache
 
@@ -63,7 +61,7 @@ class DrivingRows:
     Parameters
     ----------
     tables : sequence of mapping of str to ndarray, shape (n_steps, width)
-        One a plant, with the same names and widths.
+        One a plant, with the same names and widths [any].
     members : int
         How many.
     own : sequence of str
@@ -103,7 +101,7 @@ class DrivingRows:
         member, plant : int
             Numbers.
         own : mapping of str to ndarray, shape (n_steps, width), or None
-            What it has for itself.
+            What it has for itself [any].
         """
         self._begin[member], self._last[member] = self.first[plant], self._lengths[plant] - 1
         if self._own is not None and own is not None:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mpc.batch.building import BatchedBuilding
+from mpc.batch.building import Array, BatchedBuilding
 from mpc.batch.inputs import DrawnNoise, DrivingRows, people_rows, plant_rows
 from mpc.batch.step import Score, TracedStep
 from mpc.errors import PlantActionError, PlantError
@@ -17,8 +17,6 @@ from mpc.loop.simulated import SimulatedPlant
 from thermal._types import FloatArray, IntArray
 from thermal.batch.program import Program
 from thermal.units import REFERENCE_TEMPERATURE
-
-Array = NDArray[Any]
 
 
 class BatchedPlant:
@@ -315,13 +313,13 @@ def different_models(models: Sequence[ReducedBuilding]) -> tuple[list[ReducedBui
     return found, np.array(place, dtype=np.intp)
 
 
-def checked_plants(plants: SimulatedPlant | Sequence[SimulatedPlant]) -> tuple[SimulatedPlant, ...]:
+def checked_plants(plants: Any) -> tuple[SimulatedPlant, ...]:
     """Refuse plants that cannot be stepped together.
 
     Parameters
     ----------
     plants : SimulatedPlant or sequence of SimulatedPlant
-        The plants.
+        The plants, or what is none.
 
     Raises
     ------

@@ -12,7 +12,8 @@ from mpc.loop.actuators import COOLING_SETPOINT, HEATING_SETPOINT
 from mpc.loop.history import PlantStep
 from mpc.loop.local import LocalControl
 from mpc.loop.simulated import SimulatedPlant
-from thermal.batch.trace import Tape, Traced, TracedOperations
+from thermal.batch.operations import TracedOperations
+from thermal.batch.trace import Tape, Traced
 from thermal.components.component import Conditions
 from thermal.components.operations import Value
 from thermal.system.exchange import advance
@@ -98,6 +99,8 @@ class TracedStep:
         What a step is worth; nothing by default.
     several : bool
         Whether members have buildings of their own.
+    tape : Tape
+        Where it is noted.
     """
 
     plant: SimulatedPlant

@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import gymnasium
+import numpy as np
 import pandas as pd
 
 from mpc.environment.environment import ControlEnvironment
@@ -106,11 +107,9 @@ def office_plants(
 def office_vector_environment(
     num_envs: int = 1,
     *,
-    office: Office | None = None,
-    plant: PlantSettings | None = None,
-    starts: Sequence[str] = ("2023-01-09",),
-    days: int = 7,
     autoreset_mode: gymnasium.vector.AutoresetMode = gymnasium.vector.AutoresetMode.NEXT_STEP,
+    dtype: Any = np.float32,
+    compiled: bool = False,
     **options: Any,
 ) -> VectorEnvironment:
     """Make many environments of an office that are stepped together.
@@ -119,17 +118,15 @@ def office_vector_environment(
     ----------
     num_envs : int
         How many.
-    office, plant, starts, days
-        As in `office_environment` [d].
-    autoreset_mode : gymnasium.vector.AutoresetMode
-        As in `VectorEnvironment`.
+    autoreset_mode, dtype, compiled
+        As in `VectorEnvironment` [-].
     **options
-        As in `VectorEnvironment`.
+        As in `office_environment`.
 
     Returns
     -------
     VectorEnvironment
         To be reset.
     """
-    plants = office_plants(office, plant, starts, days)
-    return VectorEnvironment(plants, num_envs, autoreset_mode=autoreset_mode, **options)
+    single = office_environment(**options)
+    return VectorEnvironment(single, num_envs, autoreset_mode=autoreset_mode, dtype=dtype, compiled=compiled)

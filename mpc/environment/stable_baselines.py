@@ -33,7 +33,7 @@ class StableBaselinesVector(VecEnv):  # type: ignore[misc]
 
     Examples
     --------
-    >>> world = StableBaselinesVector(VectorEnvironment(plants, 512, autoreset_mode=same_step))  # doctest: +SKIP
+    >>> world = StableBaselinesVector(VectorEnvironment(single, 512, autoreset_mode=same_step))  # doctest: +SKIP
     >>> PPO("MlpPolicy", world, n_steps=64, batch_size=8192).learn(1_000_000)  # doctest: +SKIP
     """
 

@@ -11,7 +11,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from mpc.batch.inputs import DrivingRows
-from mpc.batch.plant import BatchedPlant, record_of
+from mpc.batch.plant import BatchedPlant, checked_plants, record_of
 from mpc.environment.environment import ControlEnvironment, Course, draw_episode
 from mpc.environment.features import clock
 from mpc.environment.layout import Observation
@@ -69,8 +69,8 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Observation, NDArray[np.float
 
     Parameters
     ----------
-    plants : SimulatedPlant or sequence of SimulatedPlant
-        On reduced buildings; what they may differ in `BatchedPlant` says.
+    single : ControlEnvironment
+        What a member is; its plants are on reduced buildings, and may differ in what `BatchedPlant` says.
     num_envs : int
         How many.
     autoreset_mode : gymnasium.vector.AutoresetMode
@@ -80,13 +80,13 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Observation, NDArray[np.float
         Precision of the plants, ``numpy.float32`` (default) or ``numpy.float64``; observations are in single precision.
     compiled : bool
         As in `thermal.batch.program.Program` (extra ``[fast]``).
-    **options
-        As in `ControlEnvironment`.
 
     Raises
     ------
     MpcError
-        When a reward cannot be given to many plants at once, or as in `ControlEnvironment`.
+        When a reward cannot be given to many plants at once, or an option is not known.
+    PlantError
+        When plants cannot be stepped together.
 
     Notes
     -----
@@ -96,18 +96,16 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Observation, NDArray[np.float
 
     def __init__(
         self,
-        plants: SimulatedPlant | Sequence[SimulatedPlant],
+        single: ControlEnvironment,
         num_envs: int = 1,
         *,
         autoreset_mode: AutoresetMode = AutoresetMode.NEXT_STEP,
         dtype: Any = np.float32,
         compiled: bool = False,
-        **options: Any,
     ) -> None:
         MpcError.unless(num_envs >= 1, "num_envs", "1 or more", repr(num_envs))
         modes = AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP
         MpcError.unless(autoreset_mode in modes, "autoreset_mode", "NEXT_STEP or SAME_STEP", repr(autoreset_mode))
-        single = ControlEnvironment(plants, **options)
         expected, found = "one with of_values, for many plants at once", type(single.reward).__name__
         MpcError.unless(isinstance(single.reward, BatchReward), "reward", expected, found, "see BatchReward")
         self.single, self.num_envs, self.render_mode = single, num_envs, single.render_mode
@@ -115,11 +113,11 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Observation, NDArray[np.float
         self.single_action_space, self.single_observation_space = single.action_space, single.observation_space
         self.action_space = batch_space(single.action_space, num_envs)
         self.observation_space = batch_space(single.observation_space, num_envs)
-        reward: Any = single.reward
-        self._reward_of_mean = bool(reward.of_mean)
+        given: Any = single.reward
+        self._reward_of_mean = bool(given.of_mean)
         #: The plants, stepped together.
         self.batch = BatchedPlant(
-            plants, num_envs, actions=single.actions.names, dtype=dtype, score=reward.of_values, compiled=compiled
+            checked_plants(single.plants), num_envs, actions=single.actions.names, dtype=dtype, score=given.of_values, compiled=compiled
         )
         courses = single.courses
         tables = [seen_rows(course, plant) for course, plant in zip(courses, self.batch.plants, strict=True)]

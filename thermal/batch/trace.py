@@ -16,7 +16,7 @@ import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from thermal._types import FloatArray
-from thermal.components.operations import NumpyOperations, Value
+from thermal.components.operations import Value
 from thermal.errors import ModelError
 
 _LOGICAL = (np.greater, np.greater_equal, np.less, np.less_equal, np.equal, np.not_equal)
@@ -392,42 +392,3 @@ def _joined(tape: Tape, parts: Sequence[Any], stacked: bool) -> Traced:
         target[begin : begin + shape[0]] = part
         begin += shape[0]
     return target
-
-
-class TracedOperations(NumpyOperations):
-    """Exact operations on traced values: arrays over terminals, numbers for air handlers and the boiler.
-
-    Parameters
-    ----------
-    tape : Tape
-        Where they are noted.
-    """
-
-    def __init__(self, tape: Tape) -> None:
-        super().__init__()
-        self._tape = tape
-
-    def _make_exact(self) -> None:
-        super()._make_exact()
-        self.step = lambda x, scale=1.0: (x > 0.0).number()  # type: ignore[method-assign]
-
-    def empty(self, count: int) -> Value:
-        """Make an array to be filled."""
-        return self._tape.value(count, kept=False)
-
-    def sums(self, values: Value, members: FloatArray) -> Sequence[Value]:
-        """Sum the terminals of each group, a number each."""
-        totals = values @ members
-        return [totals[k] for k in range(members.shape[1])]
-
-    def spread(self, values: Sequence[Value], index: Any) -> Value:
-        """Give each terminal its group's value."""
-        return np.stack(values)[index]
-
-    def pick(self, values: Value, index: Any) -> Value:
-        """Give each terminal its zone's value."""
-        return values[index]
-
-    def dot(self, a: Value, b: Value) -> Value:
-        """Sum products over the terminals, to a number."""
-        return a @ b

@@ -136,7 +136,7 @@ def test_actions_out_of_levels(make_environment: Any) -> None:
     assert world.action([2, 1]).tolist() == [1.0, -0.5]
     assert world.action_space.nvec.tolist() == [3, 5]
     world.step(np.array([1, 2]))
-    many = DiscreteVectorActions(VectorEnvironment([inner.plants[0]], 2), 3)  # type: ignore[list-item]
+    many = DiscreteVectorActions(VectorEnvironment(inner, 2), 3)
     many.reset(seed=0)
     assert many.actions(np.array([[0, 2], [1, 1]])).tolist() == [[-1.0, 1.0], [0.0, 0.0]]
     many.step(np.array([[0, 2], [1, 1]]))
@@ -155,19 +155,19 @@ def test_observations_are_scaled_by_a_sample(make_environment: Any) -> None:
 
 
 def test_what_does_not_fit_is_refused(make_environment: Any) -> None:
-    plant = make_environment().plants[0]
+    single = make_environment()
 
     class Mine:
         def of_steps(self, done: Any, scenario: Any, first_step: int) -> float:
             return 0.0
 
     for options, words in (
-        ({"num_envs": 0}, "1 or more"), ({"reward": Mine()}, "many plants at once"),
+        ({"num_envs": 0}, "1 or more"), ({"single": make_environment(reward=Mine())}, "many plants at once"),
         ({"autoreset_mode": AutoresetMode.DISABLED}, "NEXT_STEP or SAME_STEP"),
     ):  # fmt: skip
         with pytest.raises(MpcError, match=words):
-            VectorEnvironment(plant, **options)
-    world = VectorEnvironment(plant, 2)
+            VectorEnvironment(**{"single": single, **options})
+    world = VectorEnvironment(single, 2)
     for bad in ({"seed": [1]}, {"options": {"plants": 1}}, {"options": {"plant": 4}}):
         with pytest.raises(MpcError):
             world.reset(**bad)

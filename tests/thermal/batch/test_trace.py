@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from thermal.batch.operations import TracedOperations
 from thermal.batch.program import Program
-from thermal.batch.trace import Tape, TracedOperations
+from thermal.batch.trace import Tape
 from thermal.components.operations import NumpyOperations, Operations
 from thermal.errors import ModelError
 
