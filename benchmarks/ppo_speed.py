@@ -1,8 +1,8 @@
-"""Proximal policy optimisation on the vector environment: steps a CPU second, and what it learns on the way.
+"""Proximal policy optimisation on the vector environment: steps a CPU second, and what 20 million would take.
 
 Stable-Baselines3's PPO with nets of 64 x 64 units on 512 offices of 12 zones at once, in single precision, one thread.
-Rewards are those of `EconomicReward`; the first and the last tenth of the training are compared. ``--steps 20000000``
-is the whole run; the table says what it would take at the rate that was measured.
+``--steps 20000000`` is the whole run; the table says what it would take at the rate that was measured. What a policy is
+worth is not measured here: `mpc_vs_rl.py` does that.
 
 Run: ``python benchmarks/ppo_speed.py --out results/ppo --steps 1000000``. Writes ``ppo_speed.json`` and ``.md``.
 """
@@ -15,7 +15,6 @@ import time
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from _table import markdown, write
 from gymnasium.vector import AutoresetMode
 from simulator_speed import use_one_thread
@@ -28,18 +27,17 @@ ROLLOUT, BATCH, EPOCHS = 64, 8192, 2
 
 
 class Clocked(StableBaselinesVector):
-    """The vector, with the CPU time that its steps take and the mean reward of each."""
+    """The vector, with the CPU time that its steps take."""
 
     def __init__(self, world: Any) -> None:
         super().__init__(world)
-        self.seconds, self.rewards = 0.0, list[float]()
+        self.seconds = 0.0
 
     def step_wait(self) -> Any:
         """Step and note."""
         begin = time.process_time()
         result = super().step_wait()
         self.seconds += time.process_time() - begin
-        self.rewards.append(float(result[1].mean()))
         return result
 
 
@@ -61,13 +59,10 @@ def train(steps: int, members: int, compiled: bool, seed: int = 0) -> dict[str, 
     begin = time.process_time()
     model.learn(steps)
     seconds, done = time.process_time() - begin, model.num_timesteps
-    tenth = max(len(vector.rewards) // 10, 1)
     return {
         "steps": done, "CPU seconds": seconds, "steps a CPU second": done / seconds,
         "share of the environment": vector.seconds / seconds,
         "CPU minutes for 20 million steps": WHOLE / (done / seconds) / 60.0,
-        "mean reward, first tenth": float(np.mean(vector.rewards[:tenth])),
-        "mean reward, last tenth": float(np.mean(vector.rewards[-tenth:])),
     }  # fmt: skip
 
 

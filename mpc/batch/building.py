@@ -51,8 +51,10 @@ class Modes(NamedTuple):
             return np.pad(values, widths)
 
         parts = [m.step_matrices() for m in models]
-        return cls(*(np.stack([padded(p[k], axis) for p in parts]) for k, axis in enumerate((0, 0, 0, 1))),
-                   np.stack([p[4] for p in parts]))  # fmt: skip
+        end, driving, heating, output = (
+            np.stack([padded(p[k], axis) for p in parts]) for k, axis in enumerate((0, 0, 0, 1))
+        )
+        return cls(end, driving, heating, output, np.stack([p[4] for p in parts]))
 
 
 class BatchedBuilding:

@@ -162,7 +162,7 @@ class TracedStep:
         heat = system.at_zones(ops, done.results)
         reached = tape.call(self.building.finish, [heat, part("gains"), free], n)
         mean = 0.5 * (given.reading + reached) + REFERENCE_TEMPERATURE
-        step = PlantStep(0, conditions, actions, done, mean, reached)
+        step = PlantStep(0, conditions, actions, done, mean, reached)  # type: ignore[arg-type]
         measured = plant.sensors.exact(ops, step, part("weather"), part("people"))
         if plant.sensors.noise is not None:
             plant.sensors.noise.add(measured, given.noise)
@@ -199,7 +199,8 @@ class TracedStep:
             if name in places:
                 side, zone = places[name]
                 both[side][zone] = value - REFERENCE_TEMPERATURE
-        return np.minimum(*both), both[1]
+        lower: Value = both[0]
+        return np.minimum(lower, both[1]), both[1]
 
     def _runs(self, ops: TracedOperations, heating: Value, cooling: Value) -> tuple[list[Value], list[Value]]:
         """Which air handlers run, and which of them since a zone has drifted; as `Schedule.runs`."""

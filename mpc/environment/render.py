@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from mpc.kpi.record import PlantRecord
 from mpc.scenario.scenario import Scenario
-from thermal._types import FloatArray
 from thermal.errors import MissingExtraError
 
 _DAY = 86400.0  # s: what a picture shows
@@ -69,7 +68,7 @@ class RenderedRun:
             advice = 'pictures of environments need matplotlib: pip install "buildingmpc[rl]"'
             raise MissingExtraError(advice) from error
         figure: Any = Figure(_SIZE, dpi=100, layout="constrained")
-        canvas = FigureCanvasAgg(figure)
+        canvas: Any = FigureCanvasAgg(figure)
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
         if self.record is not None:
             self._draw(above, below, self.record)
@@ -86,7 +85,7 @@ class RenderedRun:
         rows = self.now - 1 - np.arange(count)[::-1] // each
         stamps = self.scenario.grid.stamps[max(self.now - 1, 0)]
         end = stamps.hour + stamps.minute / 60.0
-        hours: FloatArray = end - (np.arange(count)[::-1] * step) / 3600.0
+        hours = end - (np.arange(count)[::-1] * step) / 3600.0
         above.plot(hours, record.zone_temperature[-count:] - _FREEZING, linewidth=0.8)
         lower, upper = (edge[rows] - _FREEZING for edge in (self.scenario.lower, self.scenario.upper))
         above.plot(hours, np.c_[lower.max(axis=1), upper.min(axis=1)], color="black", linestyle="--", linewidth=1.0)

@@ -18,7 +18,7 @@ except ImportError as _error:
     ) from _error
 
 
-class StableBaselinesVector(VecEnv):  # type: ignore[misc]
+class StableBaselinesVector(VecEnv):
     """A vector environment with the methods that algorithms of Stable-Baselines3 call.
 
     Parameters

@@ -117,8 +117,9 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Observation, NDArray[np.float
         self._reward_of_mean = bool(given.of_mean)
         #: The plants, stepped together.
         self.batch = BatchedPlant(
-            checked_plants(single.plants), num_envs, actions=single.actions.names, dtype=dtype, score=given.of_values, compiled=compiled
-        )
+            checked_plants(single.plants), num_envs, actions=single.actions.names, dtype=dtype,
+            score=given.of_values, compiled=compiled,
+        )  # fmt: skip
         courses = single.courses
         tables = [seen_rows(course, plant) for course, plant in zip(courses, self.batch.plants, strict=True)]
         self._seen = DrivingRows(tables, num_envs, (), np.float32)
@@ -177,7 +178,7 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Observation, NDArray[np.float
 
     def step(
         self, actions: NDArray[np.float32]
-    ) -> tuple[Observation, NDArray[Any], NDArray[np.bool_], NDArray[np.bool_], Infos]:
+    ) -> tuple[Observation, Any, Any, Any, Infos]:
         """Hold an action a member for a control step.
 
         Parameters

@@ -114,7 +114,7 @@ class Program:
 
     def _room(self, shape: tuple[int, ...]) -> int:
         line = _LINE // self.dtype.itemsize
-        return -(-int(np.prod(shape)) // line) * line
+        return int(-(-int(np.prod(shape)) // line) * line)
 
     def _array(self, slot: Slot) -> NDArray[Any]:
         if slot.truth and not self._compiled:

@@ -235,10 +235,10 @@ class _Reduce(NamedTuple):
 class _Take(NamedTuple):
     """Rows by number."""
 
-    index: tuple[int, ...]
+    rows: tuple[int, ...]
 
     def __call__(self, values: FloatArray, out: FloatArray) -> None:
-        np.take(values, self.index, axis=0, out=out, mode="clip")
+        np.take(values, self.rows, axis=0, out=out, mode="clip")
 
 
 class Traced(NDArrayOperatorsMixin):
@@ -369,7 +369,8 @@ class Traced(NDArrayOperatorsMixin):
     def _product(self, first: Any, second: Any) -> Traced:
         """Product with a constant matrix or vector on either side."""
         if isinstance(first, Traced) and isinstance(second, Traced):
-            return (first * second).sum()
+            product: Traced = (first * second).sum()
+            return product
         if isinstance(second, Traced):
             matrix, vector = np.asarray(first, dtype=float), second
         else:
