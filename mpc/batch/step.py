@@ -199,8 +199,9 @@ class TracedStep:
             if name in places:
                 side, zone = places[name]
                 both[side][zone] = value - REFERENCE_TEMPERATURE
-        lower: Value = both[0]
-        return np.minimum(lower, both[1]), both[1]
+        low: Value = both[0]
+        high: Value = both[1]
+        return np.minimum(low, high), high
 
     def _runs(self, ops: TracedOperations, heating: Value, cooling: Value) -> tuple[list[Value], list[Value]]:
         """Which air handlers run, and which of them since a zone has drifted; as `Schedule.runs`."""

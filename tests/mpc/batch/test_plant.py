@@ -116,6 +116,21 @@ def test_members_may_start_anew_alone() -> None:
     np.testing.assert_allclose(batch.record(1).zone_temperature, alone.record().zone_temperature, atol=EXACT)
 
 
+def test_setpoints_of_zones_may_be_actions() -> None:
+    plant = plant_of(days=1)
+    required = [a.name for a in plant.actuators if a.required]
+    zone = plant.zone_names[1]
+    names = [*required, f"{zone}/zone_air_heating_temperature_setpoint", f"{zone}/zone_air_cooling_temperature_setpoint"]
+    batch = BatchedPlant(plant, 2, dtype=np.float64, actions=names)
+    batch.reset([0, 1])
+    plant.reset(1)
+    for row in setpoints(plant, 120, 2):
+        asked = np.vstack([row, np.full((1, 2), 295.5), np.full((1, 2), 295.0)])  # crossed: the heating one gives way
+        batch.step(asked)
+        plant.step(dict(zip(names, asked[:, 1].tolist(), strict=True)))
+    np.testing.assert_allclose(batch.zone_temperature[:, 1], plant.record().zone_temperature[-1], atol=EXACT)
+
+
 def test_what_does_not_fit_is_refused() -> None:
     plant = plant_of(days=1)
     batch = BatchedPlant(plant, 2)
