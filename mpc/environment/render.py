@@ -74,7 +74,7 @@ class RenderedRun:
             self._draw(above, below, self.record)
         above.set_ylabel("zones [°C]")
         below.set_ylabel("power [kW]")
-        below.set_xlabel("local hour")
+        below.set_xlabel("hours since local midnight")
         canvas.draw()
         return np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
