@@ -13,4 +13,8 @@ except ImportError as _error:
 ENVIRONMENT_ID = "buildingmpc/Office-v0"
 
 if ENVIRONMENT_ID not in gymnasium.registry:
-    gymnasium.register(ENVIRONMENT_ID, entry_point="mpc.environment.environment:office_environment")
+    gymnasium.register(
+        ENVIRONMENT_ID,
+        entry_point="mpc.environment.office:office_environment",
+        vector_entry_point="mpc.environment.office:office_vector_environment",
+    )

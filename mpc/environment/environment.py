@@ -1,28 +1,25 @@
-"""The closed loop as a Gymnasium environment, and that of an office in one call."""
+"""The closed loop as a Gymnasium environment."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any, Protocol, runtime_checkable
 
 import gymnasium
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from mpc.environment.features import BLOCK_ENDS, LARGEST, Outlook, clock
 from mpc.environment.layout import SUPPLY_SETPOINTS, ActionLayout, Observation, ObservationLayout
+from mpc.environment.render import RenderedRun
 from mpc.environment.reward import REWARDS, Reward
 from mpc.errors import MpcError
 from mpc.kpi.kpis import measure_kpis
+from mpc.kpi.record import PlantRecord
 from mpc.loop.history import RecentSteps
-from mpc.loop.make import PlantSettings, pilot_weather, simulated_plant
-from mpc.loop.noise import SensorNoise
 from mpc.loop.plant import Measurements, Plant
 from mpc.scenario.forecast import Forecaster
 from mpc.scenario.scenario import Scenario
 from thermal._types import FloatArray
-from thermal.pilot.building import pilot_building
 
 
 @runtime_checkable
@@ -32,7 +29,7 @@ class ScenarioPlant(Plant, Protocol):
     scenario: Scenario
 
 
-class _Course:
+class Course:
     """What is known of a plant's time: where an episode ends, the clock, and forecasts where there are some.
 
     Forecasts are known functions of the step, so they are reduced once and a step reads a row.
@@ -85,6 +82,8 @@ class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
         Control steps after which an episode is truncated; by default it lasts as long as the scenario.
     ranges : mapping of str to tuple of float, optional
         Ranges of measurements in the place of `OBSERVED_RANGES` [library's units].
+    render_mode : str, optional
+        What `render` gives: ``rgb_array``, a picture of the last day, or ``ansi``, a table of the last control step.
 
     Raises
     ------
@@ -98,7 +97,7 @@ class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
     ``info["kpis"]`` has its indicators.
     """
 
-    metadata = {"render_modes": []}  # noqa: RUF012 - Gymnasium's own form
+    metadata = {"render_modes": ["rgb_array", "ansi"], "render_fps": 12}  # noqa: RUF012 - Gymnasium's own form
 
     def __init__(
         self,
@@ -110,7 +109,11 @@ class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
         block_ends: Sequence[float] | None = BLOCK_ENDS,
         episode_steps: int | None = None,
         ranges: Mapping[str, tuple[float, float]] | None = None,
+        render_mode: str | None = None,
     ) -> None:
+        modes = (None, *self.metadata["render_modes"])
+        MpcError.unless(render_mode in modes, "render_mode", f"one of {modes}", repr(render_mode))
+        self.render_mode = render_mode
         self.plants = _checked(plants)
         if isinstance(reward, str):
             MpcError.unless_known(reward, REWARDS, "reward", "a known one")
@@ -118,15 +121,15 @@ class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
         MpcError.unless(episode_steps is None or episode_steps >= 1, "episode_steps", "1 or more", episode_steps)
         self.episode_steps = episode_steps
         first = self.plants[0]
-        self._courses = [_Course(plant, block_ends) for plant in self.plants]
+        self.courses = [Course(plant, block_ends) for plant in self.plants]
         self.actions = ActionLayout(first.actuators, actions)
-        area, outlook = first.scenario.floor_area, self._courses[0].outlook
+        area, outlook = first.scenario.floor_area, self.courses[0].outlook
         self.layout = ObservationLayout(first.columns, first.actuators, area, outlook, histograms, ranges)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (len(self.actions),), np.float32)
         self.observation_space = gymnasium.spaces.Box(-LARGEST, LARGEST, (len(self.layout),), np.float32)
         #: The plant of this episode.
         self.plant = first
-        self._course, self._step, self._done = self._courses[0], 0, 0
+        self._course, self._step, self._done = self.courses[0], 0, 0
         self._ahead: FloatArray | None = None
 
     def reset(
@@ -152,14 +155,13 @@ class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
             When an option is not known.
         """
         super().reset(seed=seed)
-        drawn = {"plant": int(self.np_random.integers(len(self.plants))),
-                 "plant_seed": int(self.np_random.integers(2**31))}  # fmt: skip
+        drawn = draw_episode(self.np_random, len(self.plants))
         for name in options or {}:
             MpcError.unless_known(name, drawn, "options", "a known one")
         info: dict[str, Any] = {**drawn, **(options or {})}
         known, expected = range(len(self.plants)), f"a plant from 0 to {len(self.plants) - 1}"
         MpcError.unless(info["plant"] in known, "options: plant", expected, repr(info["plant"]))
-        self.plant, self._course = self.plants[info["plant"]], self._courses[info["plant"]]
+        self.plant, self._course = self.plants[info["plant"]], self.courses[info["plant"]]
         self._step = self._done = 0
         return self._observe(self.plant.reset(info["plant_seed"])), info
 
@@ -187,6 +189,26 @@ class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
             info["kpis"] = measure_kpis(plant.record(), plant.scenario, control_step=plant.control_step).to_dict()
         return self._observe(seen, truncated), reward, False, truncated, info
 
+    @property
+    def observation_names(self) -> tuple[str, ...]:
+        """Names of the entries of an observation."""
+        return tuple(feature.name for feature in self.layout.features)
+
+    @property
+    def action_names(self) -> tuple[str, ...]:
+        """Names of the entries of an action."""
+        return self.actions.chosen
+
+    def render(self) -> Any:
+        """Show the plant as `render_mode` says; None without one."""
+        if self.render_mode is None:
+            return None
+        run = RenderedRun(self.plant.zone_names, self.plant.scenario, self._last_record(), self._step)
+        return run.table() if self.render_mode == "ansi" else run.picture()
+
+    def _last_record(self) -> PlantRecord | None:
+        return self.plant.record() if self._done else None
+
     def close(self) -> None:
         """Close the plants that hold something open, such as a process of EnergyPlus."""
         for plant in self.plants:
@@ -199,6 +221,19 @@ class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
         elif course.outlook is not None and not ended:  # at its end a plant may have nothing left to forecast
             self._ahead = course.outlook.of_forecast(self.plant.forecast())
         return self.layout.observe(seen.values_array, self._ahead, clock(seen.seconds, course.timezone))
+
+
+def draw_episode(rng: np.random.Generator, plants: int) -> dict[str, int]:
+    """Draw which plant an episode has, and the seed of its people and noise.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Of the environment.
+    plants : int
+        How many there are.
+    """
+    return {"plant": int(rng.integers(plants)), "plant_seed": int(rng.integers(2**31))}
 
 
 def _checked(plants: Plant | Sequence[Plant]) -> tuple[ScenarioPlant, ...]:
@@ -218,7 +253,7 @@ def _checked(plants: Plant | Sequence[Plant]) -> tuple[ScenarioPlant, ...]:
     return checked
 
 
-def _last_steps(plant: Any, course: _Course) -> RecentSteps:
+def _last_steps(plant: Any, course: Course) -> RecentSteps:
     """Read what a plant did in its last control step."""
     if course.recording:
         recent: RecentSteps = plant.recent(course.each)
@@ -229,70 +264,3 @@ def _last_steps(plant: Any, course: _Course) -> RecentSteps:
     gas = np.zeros(n) if whole.gas is None else whole.gas[-n:]
     temperature, electricity = list(whole.zone_temperature[-n - 1 :]), whole.electricity[-n:].tolist()
     return RecentSteps(whole.step, temperature, electricity, gas.tolist())
-
-
-@dataclass(frozen=True)
-class Office:
-    """A generated office, as `thermal.pilot.building.pilot_building` draws it.
-
-    Parameters
-    ----------
-    zones, floors : int
-        On all floors together; number of storeys.
-    floor_area : float
-        Of all floors together [m2].
-    seed : int
-        Of its plan, and of the first weather.
-    """
-
-    zones: int = 12
-    floors: int = 2
-    floor_area: float = 600.0
-    seed: int = 1
-
-
-def office_environment(
-    *,
-    office: Office | None = None,
-    plant: PlantSettings | None = None,
-    starts: Sequence[str] = ("2023-01-09",),
-    days: int = 7,
-    reward: str | Reward = "economic",
-    histograms: bool = False,
-    episode_steps: int | None = None,
-) -> ControlEnvironment:
-    """Make the environment of an office on its reduced model.
-
-    Parameters
-    ----------
-    office : Office, optional
-        Of twelve zones and 600 m2 by default.
-    plant : PlantSettings, optional
-        How it is simulated; control volumes of 1 m and the errors of `SensorNoise` by default. Forecasts are as long
-        as what is observed of them.
-    starts : sequence of str
-        Local days at which an episode may begin, ISO 8601; each has weather of a seed of its own.
-    days : int
-        Length of an episode [d]; the scenario is six hours longer, for the last forecast.
-    reward : str or Reward
-        As in `ControlEnvironment`.
-    histograms : bool
-        As in `ControlEnvironment`.
-    episode_steps : int, optional
-        As in `ControlEnvironment`.
-
-    Returns
-    -------
-    ControlEnvironment
-        To be reset.
-    """
-    drawn = office or Office()
-    building = pilot_building(**asdict(drawn), name="office")
-    given = plant or PlantSettings(dx=1.0, noise=SensorNoise())
-    given = replace(given, horizon=round(BLOCK_ENDS[-1] * 3600.0 / given.step_seconds))
-    plants = []
-    for k, start in enumerate(starts):
-        end = pd.Timestamp(start) + pd.Timedelta(days=days, hours=BLOCK_ENDS[-1])
-        weather = pilot_weather(drawn.seed + k, start, days + 1.0)
-        plants.append(simulated_plant(building, weather, start, end.isoformat(), given))
-    return ControlEnvironment(plants, reward=reward, histograms=histograms, episode_steps=episode_steps)

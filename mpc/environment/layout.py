@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +14,7 @@ from thermal._types import FloatArray
 from thermal.case.points import split_column
 
 Observation = NDArray[np.float32]
+Values = NDArray[Any]
 
 #: Points that a histogram can stand for, with the edges of its bins [library's units]: those of google/sbsim's
 #: HistogramReducer, its flow setpoint taken for the flow.
@@ -87,6 +89,8 @@ class ObservationLayout:
             pairs = [(k, f) for k, f in zip(kept, features, strict=True) if points[k] not in HISTOGRAM_EDGES]
             kept, features = tuple(k for k, _ in pairs), tuple(f for _, f in pairs)
         self._kept = np.array(kept, dtype=np.intp)
+        cuts = np.split(self._kept, np.flatnonzero(np.diff(self._kept) != 1) + 1) if kept else []
+        self._runs = [slice(int(run[0]), int(run[-1]) + 1) for run in cuts]
         self._factor, self._offset = scaling(features)
         ahead = () if outlook is None else outlook.features
         self.features: tuple[Feature, ...] = (*features, *counted, *ahead, *CLOCK_FEATURES)
@@ -126,6 +130,47 @@ class ObservationLayout:
         if not np.isfinite(seen.sum()):
             seen[~np.isfinite(seen)] = 0.0
         return np.minimum(np.maximum(seen, -LARGEST, out=seen), LARGEST, out=seen)
+
+
+    def observe_many(self, values: Values, ahead: Values | None, now: Values) -> Observation:
+        """Observe many plants at once.
+
+        Parameters
+        ----------
+        values : ndarray, shape (n_column, n)
+            Measurements, a column a plant [library's units].
+        ahead : ndarray, shape (n_ahead, n or 1), or None
+            Of the outlook [-].
+        now : ndarray, shape (6, n or 1)
+            Of `clock` [-].
+
+        Returns
+        -------
+        ndarray of float32, shape (n, n_feature)
+            A row a plant, as `observe` gives it; the transpose of what lies in memory.
+        """
+        seen = np.empty((len(self.features), values.shape[1]), dtype=np.float32)
+        measured, counted, forecast = self._ends
+        place = 0
+        for run in self._runs:  # slices, as picking rows would copy them
+            end = place + run.stop - run.start
+            scaled = values[run] * self._factor[place:end, None].astype(values.dtype)
+            np.add(scaled, self._offset[place:end, None].astype(values.dtype), out=seen[place:end], casting="same_kind")
+            place = end
+        begin = measured
+        for at, edges in self._histograms:
+            beyond = [(values[at] >= edge).sum(axis=0) for edge in edges]  # as `searchsorted` counts
+            counts = -np.diff(np.stack([np.full(values.shape[1], at.size), *beyond, np.zeros_like(beyond[0])]), axis=0)
+            seen[begin : begin + len(edges) + 1] = counts / at.size
+            begin += len(edges) + 1
+        own = seen[:counted]
+        if not np.isfinite(own.sum(dtype=np.float64)):
+            own[~np.isfinite(own)] = 0.0
+        np.minimum(np.maximum(own, np.float32(-LARGEST), out=own), np.float32(LARGEST), out=own)
+        if ahead is not None:
+            np.clip(ahead, -LARGEST, LARGEST, out=seen[counted:forecast], casting="same_kind")
+        seen[forecast:] = now
+        return seen.T
 
 
 class ActionLayout:
@@ -198,6 +243,38 @@ class ActionLayout:
         for (names, lowest, span), value in zip(self._groups, given, strict=True):
             setpoints |= dict.fromkeys(names, lowest + span * min(max(0.5 * (value + 1.0), 0.0), 1.0))
         return setpoints
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Actuators that are set, by ``ENTITY/POINT``, in the order of `setpoints_of_many`."""
+        return tuple(name for names, _, _ in self._groups for name in names)
+
+    def setpoints_of_many(self, actions: ArrayLike) -> FloatArray:
+        """Give the setpoints of many plants' actions.
+
+        Parameters
+        ----------
+        actions : array_like, shape (n, n_action)
+            From -1 to 1 [-].
+
+        Returns
+        -------
+        ndarray, shape (n_actuator, n)
+            In the order of `names` [K or Pa].
+
+        Raises
+        ------
+        PlantActionError
+            When a number is not finite or out of range.
+        """
+        values = np.asarray(actions, dtype=float)
+        valid = values.ndim == 2 and values.shape[1] == len(self) and bool((np.abs(values) <= _LARGEST).all())
+        if not valid:  # NaN is in no range
+            expected = f"rows of {len(self)} numbers from -1 to 1, for {', '.join(self.chosen)}"
+            raise PlantActionError("action", expected, f"shape {values.shape}, {values.min()} to {values.max()}")
+        shares = np.clip(0.5 * (values.T + 1.0), 0.0, 1.0)
+        each = self.lowest[:, None] + (self.highest - self.lowest)[:, None] * shares
+        return np.asarray(np.repeat(each, [len(names) for names, _, _ in self._groups], axis=0))
 
     def action(self, setpoints: Mapping[str, float]) -> FloatArray:
         """Give the action of setpoints, shape (n_action,) [-]: the inverse of `setpoints`.

@@ -3,13 +3,32 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Protocol
+from typing import ClassVar, Protocol, runtime_checkable
 
 from mpc.errors import MpcError
-from mpc.kpi.rewards import PaperReward, StageCost
+from mpc.kpi.rewards import PaperReward, StageCost, StepValues
 from mpc.loop.history import RecentSteps
 from mpc.scenario.scenario import Scenario
 from thermal._types import FloatArray
+from thermal.components.operations import Value
+
+
+@runtime_checkable
+class BatchReward(Protocol):
+    """A reward that many plants can be given at once: the mean, or the sum, of what each of their steps is worth."""
+
+    @property
+    def of_mean(self) -> bool:
+        """Whether a control step counts as the mean of its steps, not their sum."""
+
+    def of_values(self, step: StepValues) -> Value:
+        """Reward a step of the plant.
+
+        Parameters
+        ----------
+        step : StepValues
+            Traced: without branches on values.
+        """
 
 
 class Reward(Protocol):
@@ -42,6 +61,20 @@ class EconomicReward:
     """
 
     stage: StageCost = field(default_factory=StageCost)
+    of_mean: ClassVar[bool] = False
+
+    def of_values(self, step: StepValues) -> Value:
+        """Reward a step of the plant [currency]; see `BatchReward`.
+
+        Parameters
+        ----------
+        step : StepValues
+            What happened.
+        """
+        stage, carbon = self.stage, self.stage.carbon_price
+        electricity, gas = (price + carbon * c for price, c in zip(step.prices, step.carbons, strict=True))
+        energy = stage.energy(*step.powers, electricity, gas, step.step)
+        return -(energy + stage.discomfort(step.start, step.end, step.lower, step.upper, step.step))
 
     def of_steps(self, done: RecentSteps, scenario: Scenario, first_step: int) -> float:
         """Reward a control step [currency].
@@ -70,6 +103,18 @@ class PaperStepReward:
     """
 
     terms: PaperReward = field(default_factory=PaperReward)
+    of_mean: ClassVar[bool] = True
+
+    def of_values(self, step: StepValues) -> Value:
+        """Reward a step of the plant [-]; see `BatchReward`.
+
+        Parameters
+        ----------
+        step : StepValues
+            What happened.
+        """
+        band = step.lower, step.upper
+        return self.terms.terms(step.end, band, step.people, step.powers, step.prices, step.carbons).reward
 
     def of_steps(self, done: RecentSteps, scenario: Scenario, first_step: int) -> float:
         """Reward a control step, -1 to 0 [-].

@@ -34,7 +34,8 @@ def excess(start: FloatArray, end: FloatArray) -> tuple[FloatArray, FloatArray]:
         0 to 1 [-].
     """
     first, last, span = np.maximum(start, 0.0), np.maximum(end, 0.0), start - end
-    share = np.divide(first - last, span, out=(first > 0.0).astype(float), where=span != 0.0)
+    still = span == 0.0
+    share = np.where(still, first > 0.0, (first - last) / (span + still))
     return 0.5 * (first + last) * share, share
 
 

@@ -12,9 +12,41 @@ from mpc.kpi.record import excess
 from mpc.scenario.rates import HOUR, KILOWATT_HOUR
 from mpc.scenario.scenario import Scenario
 from thermal._types import FloatArray
+from thermal.components.operations import Value
 
 Pair = tuple[ArrayLike, ArrayLike]  # lower and upper edge, or electricity and gas
 Factors = tuple[float, float]  # of electricity and of gas
+_NOBODY = 1e-12  # people, or currency: nothing, to be divided by
+
+
+class StepValues(NamedTuple):
+    """What a reward is made of: a step of a plant, as numbers and arrays, or as traced values of many plants.
+
+    Parameters
+    ----------
+    start, end : Value, shape (n_zone,)
+        Temperatures of the zones at its ends, counted from where the band is [K].
+    lower, upper : Value, shape (n_zone,)
+        Edges of the comfort band [K].
+    people : Value, shape (n_zone,)
+        In the zones [-].
+    powers : tuple of Value
+        Electricity and gas, means over the step [W].
+    prices, carbons : tuple of Value
+        Of both [currency/kWh], [kg/kWh].
+    step : float
+        Length [s].
+    """
+
+    start: Value
+    end: Value
+    lower: Value
+    upper: Value
+    people: Value
+    powers: tuple[Value, Value]
+    prices: tuple[Value, Value]
+    carbons: tuple[Value, Value]
+    step: float
 
 
 class RewardTerms(NamedTuple):
@@ -148,30 +180,58 @@ class PaperReward:
         RewardTerms
             Reward and terms, shape (...,) each.
         """
-        zones = np.asarray(temperature, dtype=float)
-        outside = np.maximum(np.asarray(band[0]) - zones, zones - np.asarray(band[1]))
-        comfort = self._productivity(outside, np.asarray(occupancy, dtype=float))
+        zones, people = np.asarray(temperature, dtype=float), np.asarray(occupancy, dtype=float)
+        power = np.asarray(powers[0], dtype=float), np.asarray(powers[1], dtype=float)
+        edges = np.asarray(band[0], dtype=float), np.asarray(band[1], dtype=float)
+        return self.terms(zones, edges, people, power, prices, carbons)
+
+    def terms(
+        self,
+        zones: Value,
+        band: tuple[Value, Value],
+        people: Value,
+        powers: tuple[Value, Value],
+        prices: tuple[Value, Value],
+        carbons: tuple[Value, Value],
+    ) -> RewardTerms:
+        """Reward of a step: the equations of `of_values`, for arrays and for traced values.
+
+        Parameters
+        ----------
+        zones : Value, shape (..., n_zone)
+            Temperatures [K].
+        band : tuple of Value, shape (n_zone,)
+            Lower and upper edge, counted from where the temperatures are [K].
+        people : Value, shape (n_zone,)
+            In the zones [-].
+        powers : tuple of Value
+            Electricity and gas [W].
+        prices, carbons : tuple of Value
+            Price [currency/kWh] and emissions [kg/kWh] of electricity and of gas.
+        """
+        outside = np.maximum(band[0] - zones, zones - band[1])
         if self.comfort == "setpoint_deviation":
-            comfort = -np.clip(outside / self.deviation_scale, 0.0, 1.0).mean(axis=-1)
-        electricity = np.minimum(np.asarray(powers[0], dtype=float), self.highest_electricity)
-        gas = np.minimum(np.asarray(powers[1], dtype=float), self.highest_gas)
+            share = np.minimum(np.maximum(outside / self.deviation_scale, 0.0), 1.0)
+            comfort = -share.mean(axis=-1)
+        else:
+            comfort = self._productivity(outside, people)
+        electricity = np.minimum(powers[0], self.highest_electricity)
+        gas = np.minimum(powers[1], self.highest_gas)
         cost, carbon = (self._share(electricity, gas, factors) for factors in (prices, carbons))
         weights = (self.comfort_weight, self.cost_weight, self.carbon_weight)
         total = (weights[0] * comfort - weights[1] * cost - weights[2] * carbon) / sum(weights)
         return RewardTerms(total, comfort, -cost, -carbon)
 
-    def _productivity(self, outside: FloatArray, people: FloatArray) -> FloatArray:
-        count = people.sum()
-        if count <= 0.0:
-            return np.zeros(outside.shape[:-1])
+    def _productivity(self, outside: Value, people: Value) -> Value:
+        count = people.sum(axis=-1)
         share = np.where(outside > 0.0, expit(self.stiffness * (self.half_distance - outside)), 1.0)
         lowest = self.lowest_productivity / self.highest_productivity
-        mean = np.maximum(share @ people / count, lowest)
-        return np.asarray((mean - lowest) / (1.0 - lowest) - 1.0)
+        mean = np.maximum((share * people).sum(axis=-1) / np.maximum(count, _NOBODY), lowest)
+        return (count > 0.0) * ((mean - lowest) / (1.0 - lowest) - 1.0)
 
-    def _share(self, electricity: FloatArray, gas: FloatArray, factors: Factors) -> FloatArray:
+    def _share(self, electricity: Value, gas: Value, factors: tuple[Value, Value]) -> Value:
         highest = self.highest_electricity * factors[0] + self.highest_gas * factors[1]
-        return np.asarray((electricity * factors[0] + gas * factors[1]) / highest if highest > 0 else 0.0 * electricity)
+        return (electricity * factors[0] + gas * factors[1]) / np.maximum(highest, _NOBODY)
 
 
 #: What a zone's kelvin outside of its band for an hour counts [currency/K/h], unless told otherwise: so much that
@@ -233,9 +293,37 @@ class StageCost:
         power_e, power_g = np.asarray(electricity, dtype=float), np.asarray(gas, dtype=float)
         price_e = scenario.electricity_price[k] + self.carbon_price * scenario.electricity_carbon[k]
         price_g = scenario.gas_price[k] + self.carbon_price * scenario.gas_carbon[k]
-        step = scenario.grid.step
-        energy = (price_e * power_e + price_g * power_g) * step / KILOWATT_HOUR
+        step = float(scenario.grid.step)
+        energy = self.energy(power_e, power_g, price_e, price_g, step)
         if (np.minimum(first, last) >= lower).all() and (np.maximum(first, last) <= upper).all():
             return np.asarray(energy)
-        discomfort = excess(lower - first, lower - last)[0] + excess(first - upper, last - upper)[0]
-        return np.asarray(energy + self.discomfort_price * discomfort.sum(axis=-1) * step / HOUR)
+        return np.asarray(energy + self.discomfort(first, last, lower, upper, step))
+
+    def energy(self, electricity: Value, gas: Value, electricity_price: Value, gas_price: Value, step: float) -> Value:
+        """Cost of energy over a step [currency].
+
+        Parameters
+        ----------
+        electricity, gas : Value
+            Powers, means over the step [W].
+        electricity_price, gas_price : Value
+            With the price of emissions [currency/kWh].
+        step : float
+            Length [s].
+        """
+        return (electricity_price * electricity + gas_price * gas) * (step / KILOWATT_HOUR)
+
+    def discomfort(self, start: Value, end: Value, lower: Value, upper: Value, step: float) -> Value:
+        """Cost of discomfort over a step [currency].
+
+        Parameters
+        ----------
+        start, end : Value, shape (..., n_zone)
+            Temperatures of the zones, a straight line in between [K].
+        lower, upper : Value, shape (n_zone,)
+            Edges of the comfort band [K].
+        step : float
+            Length [s].
+        """
+        outside = excess(lower - start, lower - end)[0] + excess(start - upper, end - upper)[0]
+        return (self.discomfort_price * step / HOUR) * outside.sum(axis=-1)

@@ -181,8 +181,10 @@ def checked_actions(actions: Mapping[str, float], actuators: Mapping[str, Actuat
     """
     given: dict[str, float] = {}
     for name, value in actions.items():
-        PlantActionError.unless_known(name, actuators, "action", "an actuator of the plant")
-        actuator = actuators[name]
+        actuator = actuators.get(name)
+        if actuator is None:
+            PlantActionError.unless_known(name, actuators, "action", "an actuator of the plant")
+            continue
         try:
             number = float(value)
         except (TypeError, ValueError):

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from thermal._types import FloatArray
+from thermal.components.operations import Value
 from thermal.components.terminals import Terminals
 from thermal.system.system import HvacSystem
 from thermal.units import AIR_HEAT_CAPACITY
@@ -53,7 +54,7 @@ class LocalControl:
     """
 
     def __init__(self, system: HvacSystem, response: FloatArray) -> None:
-        self._system, self._response = system, response
+        self._system, self.response = system, response
         self._rest = np.zeros(len(response))
         self._columns = np.arange(len(response))
         self._known: tuple[Any, ...] = ()
@@ -105,6 +106,24 @@ class LocalControl:
         self._rest = offset + free * slope
         return self._rest
 
+    def rest(self, free: Value, lines: tuple[Value, Value, Value, Value]) -> Value:
+        """Find the zones' temperatures at the end of a step among lines: `settle` without looking anything up.
+
+        Parameters
+        ----------
+        free : Value, shape (n_zone,)
+            That they would reach without supply air, with what the last step missed [K].
+        lines : tuple of Value
+            As `segments` gives them.
+        """
+        begin, _, offset, slope = lines
+        chosen_offset, chosen_slope = offset[0], slope[0]
+        for k in range(1, len(begin)):
+            beyond = begin[k] < free
+            chosen_offset = np.where(beyond, offset[k], chosen_offset)
+            chosen_slope = np.where(beyond, slope[k], chosen_slope)
+        return chosen_offset + free * chosen_slope
+
     def _lines(self, free: FloatArray) -> tuple[FloatArray, ...]:
         """On which line each zone is: where it begins and ends, and its offset and slope."""
         place = np.add.reduce(self._start < free, axis=0) * free.size + self._columns
@@ -118,36 +137,75 @@ class LocalControl:
         reached : ndarray, shape (n_zone,)
             Temperatures at the end of the step [K].
         """
-        self.missed = self.missed + _FOLLOW * (reached - self._rest)
+        self.missed = self.missing(self.missed, reached, self._rest)
+
+    @staticmethod
+    def missing(missed: Value, reached: Value, rest: Value) -> Value:
+        """Give what the next step is to make up for [K].
+
+        Parameters
+        ----------
+        missed : Value
+            That the last one was to make up for [K].
+        reached, rest : Value
+            Where the zones came to, and where they were expected [K].
+        """
+        return missed + _FOLLOW * (reached - rest)
 
     def _lay_out(
         self, heating: FloatArray, cooling: FloatArray, supply: tuple[float, ...], reach: tuple[float, ...]
     ) -> None:
-        """Tabulate which end temperature belongs to which free temperature: lines between seven rising points."""
-        system, terminals, width = self._system, self._system.terminals, self._system.thermostat.throttling_range
-        zone, first = terminals.zone, terminals.reheat_first
-        air, most = (np.array(v)[terminals.air_handler] for v in (supply, reach))
-        limit = np.maximum(terminals.discharge_limit, air)
-        low, gap = heating, np.maximum(cooling - heating, 1e-3)
-        full, begun = low - width, low - min(first, 0.999) * width
-        ends = np.stack([full - _FAR, full, begun, low, low + gap, low + gap + width, low + gap + width + _FAR])
-        least, warm, cool = (np.minimum(f, most * terminals.design_flow) for f in (
-            terminals.minimum_flow, terminals.heating_flow, terminals.design_flow))  # fmt: skip
-        flows = (warm, warm, least, least, least, cool, cool)
-        discharge = (limit, limit, limit, air, air, air, air)
-        heat = np.stack([
-            system.by_zone(AIR_HEAT_CAPACITY * flow * (leaving - end[zone]))
-            for flow, leaving, end in zip(flows, discharge, ends, strict=True)
-        ])  # fmt: skip
-        calls = (1.0, 1.0, min(first, 0.999), 0.0, 0.0, -1.0, -1.0)
-        for group in (g for g in system.groups.values() if not isinstance(g, Terminals)):
-            for row, (call, end) in enumerate(zip(calls, ends, strict=True)):
-                likely = group.likely_heat(call, end[group.zone])
-                heat[row] += np.bincount(group.zone, likely, system.zone_count)
-        start = ends - self._response * heat
-        slope = np.diff(ends, axis=0) / np.diff(start, axis=0)
+        """Tabulate which end temperature belongs to which free temperature."""
+        begin, end, offset, slope = self.segments(heating, cooling, np.array(supply), np.array(reach))
+        self._start = end[:-1].copy()
         # the outer lines go on for ever
-        begin, end = start[:-1].copy(), start[1:].copy()
         begin[0], end[-1] = -_ENDLESS, _ENDLESS
-        self._start = start[1:-1]
-        self._table = np.stack([t.ravel() for t in (begin, end, ends[:-1] - slope * start[:-1], slope)])
+        self._table = np.stack([t.ravel() for t in (begin, end, offset, slope)])
+
+    def segments(
+        self, heating: Value, cooling: Value, supply: Value, reach: Value, zero: float = 0.0
+    ) -> tuple[Value, Value, Value, Value]:
+        """Lay out which end temperature belongs to which free temperature: lines between seven rising points.
+
+        Parameters
+        ----------
+        heating, cooling : Value, shape (n_zone,)
+            Setpoints, counted from `zero` [K].
+        supply : Value, shape (n_air_handler,)
+            Setpoints of the supply air, counted from `zero` [K].
+        reach : Value, shape (n_air_handler,)
+            Most flow over the design flow that each duct's pressure drives [-].
+        zero : float
+            Temperature that the others are counted from [K].
+
+        Returns
+        -------
+        tuple of Value, shape (6, n_zone)
+            Free temperatures at which the lines begin and end, counted from `zero` [K]; offset [K] and slope [-].
+        """
+        system, terminals, width = self._system, self._system.terminals, self._system.thermostat.throttling_range
+        first = min(terminals.reheat_first, 0.999)
+        air, most = supply[terminals.air_handler], reach[terminals.air_handler] * terminals.design_flow
+        limit = np.maximum(air, terminals.discharge_limit - zero)
+        low, high = heating, heating + np.maximum(cooling - heating, 1e-3)
+        full = low - width
+        ends = np.stack([full - _FAR, full, low - first * width, low, high, high + width, high + width + _FAR])
+        least, warm, cool = (np.minimum(most, f) for f in (
+            terminals.minimum_flow, terminals.heating_flow, terminals.design_flow))  # fmt: skip
+        flows = np.stack([warm, warm, least, least, least, cool, cool])
+        discharge = np.stack([limit, limit, limit, air, air, air, air])
+        seen = ends if terminals.one_each == system.zone_count else ends[:, terminals.zone]
+        heat = system.by_zone(AIR_HEAT_CAPACITY * flows * (discharge - seen))
+        if len(system.groups) > bool(len(terminals)):
+            heat = heat + np.stack([self._likely(call, end + zero) for call, end in zip(
+                (1.0, 1.0, first, 0.0, 0.0, -1.0, -1.0), ends, strict=True)])  # fmt: skip
+        start = ends - self.response * heat
+        begin, end = start[:-1], start[1:]
+        slope = (ends[1:] - ends[:-1]) / (end - begin)
+        return begin, end, ends[:-1] - slope * begin, slope
+
+    def _likely(self, call: float, zone: Value) -> Value:
+        """Heat that all but terminals are likely to bring to the zones [W]."""
+        system = self._system
+        others = [(name, g) for name, g in system.groups.items() if not isinstance(g, Terminals)]
+        return sum(g.likely_heat(call, zone[g.zone]) @ system.rooms[name] for name, g in others)

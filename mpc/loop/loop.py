@@ -71,28 +71,28 @@ class PlantLoop:
         boundary: FloatArray,
     ) -> None:
         self.hvac, self._model, self._operation = HvacPlant(system), model, operation
-        self._seconds, self._boundary = float(scenario.grid.step), boundary
+        self._seconds, self.boundary = float(scenario.grid.step), boundary
         self._outdoor = [float(v) for v in scenario.outdoor]
-        self._schedule = Schedule(operation, system, scenario.zones)
-        self._terminals = next(iter(system.of_kind(Terminals)), None)
-        self._local = LocalControl(system, zone_response(model, most_heat(system)))
+        self.schedule = Schedule(operation, system, scenario.zones)
+        self.terminals = next(iter(system.of_kind(Terminals)), None)
+        self.local = LocalControl(system, zone_response(model, most_heat(system)))
         self._off = (False,) * len(system.air_handlers)
         signals = [signal.name for signal in model.network.signals]
         radiant = [f"{RADIANT}{zone}" for zone in scenario.zones]
         radiates = "radiant_heat" in system.heating and set(radiant) <= set(signals)
-        self._radiant = [signals.index(name) for name in radiant] if radiates else []
+        self.radiant = [signals.index(name) for name in radiant] if radiates else []
         rooms = model.network.anatomy.rooms
         # where the case says what heaters give their heat by the model knows what becomes of it
-        self._unsaid = np.array([not rooms[zone].emitted for zone in scenario.zones])
-        self._offset = sensor_offset(model)
-        self._biased = bool(self._offset.any())
+        self.unsaid = np.array([not rooms[zone].emitted for zone in scenario.zones])
+        self.offset = sensor_offset(model)
+        self.biased = bool(self.offset.any())
         self._reading = np.zeros(len(scenario.zones))
         self._state, self._cycling = self.hvac.start(), self._off
 
     @property
     def air(self) -> FloatArray:
         """Air of the zones, which biased sensors do not say, shape (n_zone,) [K]."""
-        return self._reading - self._offset
+        return self._reading - self.offset
 
     def start(self, signals: FloatArray) -> None:
         """Start from a steady state at usual temperatures.
@@ -103,15 +103,15 @@ class PlantLoop:
             Of the effects [signal unit].
         """
         zones = np.clip(_ZONES, self._operation.heating[0], self._operation.cooling[0])
-        self._reading = self._model.reset(zones, self._boundary[0], signals)
+        self._reading = self._model.reset(zones, self.boundary[0], signals)
         self._model.reseed(0)
         self._state, self._cycling = self.hvac.start(), self._off
-        self._local.missed = np.zeros_like(self._reading)
+        self.local.missed = np.zeros_like(self._reading)
 
     def save(self) -> LoopState:
         """Keep the state."""
         return LoopState(
-            self._model.save_state(), self._state, self._cycling, self._reading, self._local.missed
+            self._model.save_state(), self._state, self._cycling, self._reading, self.local.missed
         )  # fmt: skip
 
     def restore(self, state: LoopState) -> None:
@@ -122,7 +122,7 @@ class PlantLoop:
         state : LoopState
             Of `save`.
         """
-        building, self._state, self._cycling, self._reading, self._local.missed = state
+        building, self._state, self._cycling, self._reading, self.local.missed = state
         self._model.restore_state(building)
 
     def advance(self, k: int, given: Mapping[str, float], gains: FloatArray, effects: EffectSignals) -> PlantStep:
@@ -139,23 +139,23 @@ class PlantLoop:
         effects : EffectSignals
             Signals of the effects.
         """
-        heating, cooling = self._schedule.setpoints(k, given)
-        runs, self._cycling = self._schedule.runs(k, self._reading, heating, cooling, self._cycling)
-        free = self._model.begin(gains, self._boundary[k], effects.known(k))
-        actions, supply, reach = self._schedule.actions(given, runs, self._schedule.ventilation[k])
+        heating, cooling = self.schedule.setpoints(k, given)
+        runs, self._cycling = self.schedule.runs(k, self._reading, heating, cooling, self._cycling)
+        free = self._model.begin(gains, self.boundary[k], effects.known(k))
+        actions, supply, reach = self.schedule.actions(given, runs, self.schedule.ventilation[k])
         zone = self._reading
-        if self._local.settles:
-            zone = self._local.settle(free, heating, cooling, supply, reach)
+        if self.local.settles:
+            zone = self.local.settle(free, heating, cooling, supply, reach)
         conditions = Conditions(zone, heating, cooling, self._outdoor[k])
-        set_back = self._schedule.set_back[k]
+        set_back = self.schedule.set_back[k]
         self._state, done = self.hvac.step(self._state, conditions, actions, self._seconds, set_back)
         heat = self.hvac.heat(done)
-        terminals = done.results[self._terminals] if self._terminals else done.terminals
+        terminals = done.results[self.terminals] if self.terminals else done.terminals
         by_heaters = heat - self.hvac.system.by_zone(terminals.heat)
         signals = effects.at(k, terminals.airflow, heat, by_heaters)
-        if self._radiant:
+        if self.radiant:
             signals = signals.copy()
-            signals[self._radiant] += self._unsaid * self.hvac.heat(done, "radiant_heat")
+            signals[self.radiant] += self.unsaid * self.hvac.heat(done, "radiant_heat")
         mean, self._reading = self._model.finish(heat, signals)
-        self._local.learn(self._reading)
-        return PlantStep(k, conditions, actions, done, mean, self.air if self._biased else self._reading)
+        self.local.learn(self._reading)
+        return PlantStep(k, conditions, actions, done, mean, self.air if self.biased else self._reading)

@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 from mpc.errors import PlantError
 from mpc.loop.plant import PointLayout
 from thermal._types import FloatArray
+from thermal.components.operations import Value
 
 _STREAM = 7  # of random numbers of a seed, apart from those of people, forecasts and the shuffle
-_BLOCK = 64  # steps whose noise is drawn together
+BLOCK = 64  # steps whose noise is drawn together
 _FREEZING = 273.15  # K: sensors count their resolution from here
 
 
@@ -67,15 +68,37 @@ class NoiseSource:
         self._block: tuple[tuple[int, int], FloatArray] = ((-1, -1), np.zeros((0, 0)))
 
     @cached_property
-    def _scales(self) -> tuple[NDArray[np.intp], FloatArray, FloatArray, NDArray[np.bool_]]:
-        """Columns with noise, their absolute and relative deviations, and which count in steps."""
+    def _groups(self) -> list[tuple[NDArray[np.intp], NDArray[np.intp], float, float, float]]:
+        """Columns with noise, which random numbers are theirs, absolute and relative deviation, steps they count in."""
         noise = self.noise
         by = {"temperature": (noise.temperature, 0.0), "air_flow": (0.0, noise.flow), "power": (0.0, noise.power),
               "pressure": (0.0, noise.pressure)}  # fmt: skip
         columns = enumerate(zip(self.layout.columns, self.layout.quantities, strict=True))
-        rows = [(k, *by[q], q == "temperature") for k, (name, q) in columns if name.endswith("_sensor") and q in by]
-        index, absolute, relative, stepped = (np.array(v) for v in zip(*rows, strict=True))
-        return index.astype(np.intp), absolute.astype(float), relative.astype(float), stepped.astype(bool)
+        kept = [(k, q) for k, (name, q) in columns if name.endswith("_sensor") and q in by]
+        found = []
+        for quantity, deviations in by.items():
+            rows = [(k, n) for n, (k, q) in enumerate(kept) if q == quantity]
+            if rows:
+                column, number = (np.array(v, dtype=np.intp) for v in zip(*rows, strict=True))
+                found.append((column, number, *deviations, noise.resolution * (quantity == "temperature")))
+        return found
+
+    @cached_property
+    def width(self) -> int:
+        """Random numbers of a step."""
+        return sum(column.size for column, *_ in self._groups)
+
+    def block(self, number: int, seed: int) -> FloatArray:
+        """Draw the random numbers of `BLOCK` steps, shape (BLOCK, width) [-].
+
+        Parameters
+        ----------
+        number : int
+            Of the block, from 0.
+        seed : int
+            0 or more.
+        """
+        return np.random.default_rng([seed, _STREAM, number]).standard_normal((BLOCK, self.width))
 
     def disturb(self, k: int, values: FloatArray, seed: int) -> FloatArray:
         """Add the noise of a step to its values, which depends on seed and step only.
@@ -89,15 +112,23 @@ class NoiseSource:
         seed : int
             0 or more.
         """
-        index, absolute, relative, stepped = self._scales
-        number, row = divmod(k, _BLOCK)
+        number, row = divmod(k, BLOCK)
         if self._block[0] != (seed, number):
-            rng = np.random.default_rng([seed, _STREAM, number])
-            self._block = ((seed, number), rng.standard_normal((_BLOCK, index.size)))
-        exact = values[index]
-        seen = exact + (absolute + relative * np.abs(exact)) * self._block[1][row]
-        if self.noise.resolution > 0.0:
-            counted = _FREEZING + self.noise.resolution * np.round((seen - _FREEZING) / self.noise.resolution)
-            seen = np.where(stepped, counted, seen)
-        values[index] = seen
+            self._block = ((seed, number), self.block(number, seed))
+        self.add(values, self._block[1][row])
         return values
+
+    def add(self, values: Value, drawn: Value) -> None:
+        """Add noise to values.
+
+        Parameters
+        ----------
+        values : Value, shape (n_column,)
+            Exact values [library's units]; written to.
+        drawn : Value, shape (width,)
+            Random numbers [-].
+        """
+        for column, number, absolute, relative, step in self._groups:
+            exact, drawn_here = values[column], drawn[number]
+            seen = exact + (np.abs(exact) * relative if relative else absolute) * drawn_here
+            values[column] = np.rint((seen - _FREEZING) / step) * step + _FREEZING if step > 0.0 else seen

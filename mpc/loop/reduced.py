@@ -65,6 +65,10 @@ class ReducedBuilding:
         """Modes of the building's model, from `REFERENCE_TEMPERATURE` on, shape (order,) [K]."""
         return self._scale * self._state
 
+    def step_matrices(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Give what `begin` and `finish` step with: end, driving, heating, output and response of the states here."""
+        return self._end, self._driving.T, self._heating, self._output, self._response
+
     def reset(self, zone: FloatArray, boundary: FloatArray, signals: FloatArray) -> FloatArray:
         """Start from a steady state; see `BuildingModel`.
 

@@ -1,7 +1,7 @@
 """The schedules of a building's automation as a plant steps through them, with its night cycle."""
 
-import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,10 @@ from mpc.loop.actuators import COOLING_SETPOINT, HEATING_SETPOINT, STATIC_PRESSU
 from mpc.loop.operation import Operation, shared_rows
 from thermal._types import FloatArray
 from thermal.components.air_handler import AirHandler
+from thermal.components.operations import Operations, StepOperations, Value
 from thermal.system.system import HvacSystem
+
+_STEP = StepOperations()
 
 
 class Schedule:
@@ -102,9 +105,30 @@ class Schedule:
         beyond = np.maximum(heating - zone, zone - cooling)
         if beyond[beyond.argmax()] <= 0.0:  # none has drifted at all
             return scheduled, (False,) * len(scheduled)
-        worst = [float(beyond[zones].max()) for zones in self._served]
-        now = tuple(w > (0.0 if was else self._limit) for w, was in zip(worst, cycling, strict=True))
-        return tuple(max(s, float(c)) for s, c in zip(scheduled, now, strict=True)), now
+        was = tuple(map(float, cycling))
+        now = self.drifted(_STEP, np.maximum(heating - zone, zone - cooling), was)
+        return tuple(max(s, c) for s, c in zip(scheduled, now, strict=True)), tuple(map(bool, now))
+
+    def drifted(self, ops: Operations, beyond: Value, was: Sequence[Value]) -> list[Value]:
+        """Tell which air handlers run since a zone has drifted too far.
+
+        Parameters
+        ----------
+        ops : Operations
+            Arithmetic.
+        beyond : Value, shape (n_zone,)
+            What the zones are beyond their setpoints [K].
+        was : sequence of Value
+            1 for those that ran for this reason in the step before, else 0 [-].
+
+        Returns
+        -------
+        list of Value
+            The same now.
+        """
+        worst = [beyond[zones].max(axis=-1) for zones in self._served]
+        limit = self._limit or 0.0
+        return [ops.scalar.step(w - limit * (1.0 - before)) for w, before in zip(worst, was, strict=True)]
 
     def actions(
         self, given: Mapping[str, float], runs: tuple[float, ...], ventilation: float
@@ -128,13 +152,31 @@ class Schedule:
         """
         if given != self._known[0] or (runs, ventilation) != self._known[1:]:
             self._known = dict(given), runs, ventilation
-            chosen = {name: value for name, value in given.items() if name not in self._given}
-            fans, outdoor = self._switches
-            chosen |= dict(zip(fans, runs, strict=True)) | dict.fromkeys(outdoor, ventilation)
-            chosen |= dict.fromkeys(self._water, max(runs, default=1.0))
-            reach = [
-                run * math.sqrt(chosen.get(pressure, self._optional[pressure]) / self._optional[pressure])
-                for run, (_, pressure) in zip(runs, self._supply, strict=True)
-            ]
-            self._made = chosen, tuple(chosen[air] for air, _ in self._supply), tuple(reach)
+            self._made = self.switched(_STEP.scalar, given, runs, ventilation)
         return self._made
+
+    def switched(
+        self, few: Operations, given: Mapping[str, Value], runs: Sequence[Value], ventilation: Value
+    ) -> tuple[dict[str, Value], tuple[Value, ...], tuple[Value, ...]]:
+        """Add to a controller's actions what schedules switch: `actions` anew.
+
+        Parameters
+        ----------
+        few : Operations
+            Arithmetic of single values.
+        given : mapping of str to Value
+            The controller's [K] or [Pa].
+        runs : sequence of Value
+            1 or 0 for each air handler [-].
+        ventilation : Value
+            Share of the minimum of outdoor air [-].
+        """
+        chosen = {name: value for name, value in given.items() if name not in self._given}
+        fans, outdoor = self._switches
+        chosen |= dict(zip(fans, runs, strict=True)) | dict.fromkeys(outdoor, ventilation)
+        chosen |= dict.fromkeys(self._water, reduce(few.maximum, runs) if runs else 1.0)
+        reach = [
+            run * few.sqrt(chosen.get(pressure, self._optional[pressure]) / self._optional[pressure])
+            for run, (_, pressure) in zip(runs, self._supply, strict=True)
+        ]
+        return chosen, tuple(chosen[air] for air, _ in self._supply), tuple(reach)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +18,12 @@ from thermal.case.points import DISCHARGE_TEMPERATURE, SUPPLY_FLOW
 from thermal.components.air_handler import AirHandler
 from thermal.components.component import Group
 from thermal.components.moist_air import LEAST_AIR
+from thermal.components.operations import Operations, StepOperations, Value
 from thermal.components.terminals import Terminals
 from thermal.system.points import HvacPoints
 from thermal.system.system import HvacSystem
+
+_STEP = StepOperations()
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +165,7 @@ class Sensors:
         self._flow = self._places(boxes, SUPPLY_FLOW)
         self._discharge = self._places(boxes, DISCHARGE_TEMPERATURE)
         self._weather = scenario.weather.frame.to_numpy(dtype=float)
-        self._noise = None if noise is None else NoiseSource(self.layout, noise)
+        self.noise = None if noise is None else NoiseSource(self.layout, noise)
 
     def _places(self, entities: Iterable[str], point: str) -> NDArray[np.intp]:
         return np.array([self.layout.position[f"{entity}/{point}"] for entity in entities], dtype=np.intp)
@@ -186,19 +190,45 @@ class Sensors:
         ndarray, shape (n_column,)
             In the library's units.
         """
+        whole = self.exact(_STEP, step, self._weather[step.number], people)
+        return whole if self.noise is None else self.noise.disturb(step.number, whole, seed)
+
+    def exact(self, ops: Operations, step: PlantStep, weather: Value, people: Value) -> Any:
+        """Read all points after a step without noise.
+
+        Parameters
+        ----------
+        ops : Operations
+            Arithmetic.
+        step : PlantStep
+            Of the plant.
+        weather : Value, shape (n_weather,)
+            As measured [library's units].
+        people : Value, shape (n_zone,)
+            In the zones [-].
+
+        Returns
+        -------
+        Value, shape (n_column,)
+            In the library's units.
+        """
         place, zone, conditions, air = self._terminals.zone, step.mean, step.conditions, step.done.terminals
-        values = self._points.read(conditions._replace(zone_temperature=zone), step.actions, step.done)
-        flowing = air.airflow > LEAST_AIR
-        lift = (zone - conditions.zone_temperature)[place]
-        values[self._discharge] = np.where(flowing, air.discharge + lift, zone[place])
-        values[self._flow] = np.where(flowing, air.airflow, 0.0)
-        parts: list[Sequence[float] | FloatArray] = [values]
+        values = ops.empty(len(self.layout.columns))
+        self._points.read(conditions._replace(zone_temperature=zone), step.actions, step.done, ops, values)
+        if place.size:
+            flowing = air.airflow > LEAST_AIR
+            lift = (zone - conditions.zone_temperature)[place]
+            values[self._discharge] = np.where(flowing, air.discharge + lift, zone[place])
+            values[self._flow] = np.where(flowing, air.airflow, 0.0)
+        begin = len(self._points.columns)
         if self._chiller:
-            cooling = np.array([handler.mixed.cooling_power for handler in step.done.air_handlers], dtype=float)
-            values[self._meters] -= cooling
-            parts.append([float(cooling.sum())])
-        parts.append(self._weather[step.number])
+            cooling = [handler.mixed.cooling_power for handler in step.done.air_handlers]
+            for at, power in zip(self._meters.tolist(), cooling, strict=True):
+                values[at] = values[at] - power
+            values[begin] = sum(cooling)
+            begin += 1
+        width = self._weather.shape[1]
+        values[begin : begin + width] = weather
         if self._counted:
-            parts.append(people)
-        whole = np.concatenate(parts)
-        return whole if self._noise is None else self._noise.disturb(step.number, whole, seed)
+            values[begin + width :] = people
+        return values

@@ -130,6 +130,18 @@ class EffectSignals:
         row["commanded"] = np.zeros((1, len(self._now.building.commanded)))  # all heat is the plant's own
         self._now.put(self._ahead.stamps[k : k + 1], row)
 
+    def in_advance(self) -> FloatArray:
+        """Give all signals, shape (n_steps, n_signal) [signal unit].
+
+        Raises
+        ------
+        PlantError
+            When one of them is known only while the plant runs.
+        """
+        expected, found = "signals that are known in advance", ", ".join(s.name for _, s in self._live)
+        PlantError.unless(not self._live, "effects of batched plants", expected, found, "leave that effect out")
+        return self._values
+
     def known(self, k: int) -> FloatArray:
         """Give the signals of a step as far as they are known before it, shape (n_signal,) [signal unit].
 

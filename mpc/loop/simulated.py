@@ -124,11 +124,11 @@ class SimulatedPlant:
         self.operation = operation or scheduled_operation(scenario, len(system.air_handlers))
         self.operation.fits(scenario.grid.n_steps, len(scenario.zones), len(system.air_handlers))
         boundary = boundary_series(scenario, model, boundaries or {})
-        self._loop = PlantLoop(scenario, system, model, self.operation, boundary)
+        self.loop = PlantLoop(scenario, system, model, self.operation, boundary)
         self._step = float(scenario.grid.step)
-        self._sensors = Sensors(system, self.devices.chiller, scenario, noise, count_people, pressures)
+        self.sensors = Sensors(system, self.devices.chiller, scenario, noise, count_people, pressures)
         self._signals = self._given_signals = EffectSignals(model.network, scenario, system)
-        self._given, self._gains = scenario, shared_rows(scenario.gains)
+        self.given, self._gains = scenario, shared_rows(scenario.gains)
         self._drawn: int | None = None
         self._warm: tuple[LoopState, PlantStep] | None = None
         self._number, self._steps = -1, list[PlantStep]()
@@ -148,7 +148,7 @@ class SimulatedPlant:
     @property
     def columns(self) -> tuple[str, ...]:
         """Names of the measurements."""
-        return self._sensors.layout.columns
+        return self.sensors.layout.columns
 
     @property
     def finished(self) -> bool:
@@ -178,10 +178,10 @@ class SimulatedPlant:
                 raise PlantError(describe("seed", "0 or more", repr(seed)))
             self._seed = seed
             self._draw(seed)
-        warm, last = self._warmed_up()
-        self._loop.restore(warm)
+        warm, last = self.warmed_up()
+        self.loop.restore(warm)
         self.model.reseed(self._seed)
-        self._first, self._number, self._steps = self._loop.air, 0, []
+        self._first, self._number, self._steps = self.loop.air, 0, []
         return self._seen([last], int(self.scenario.grid.edges[0]))
 
     def step(self, actions: Mapping[str, float]) -> Measurements:
@@ -211,7 +211,7 @@ class SimulatedPlant:
         if self.finished:
             found = f"{self.scenario.grid.n_steps - self._number} of its {self.scenario.grid.n_steps}"
             raise PlantError(describe("scenario", f"{self.control_steps} more steps", found, "make it longer"))
-        first, advance, gains = self._number, self._loop.advance, self._gains
+        first, advance, gains = self._number, self.loop.advance, self._gains
         fresh = [advance(k, given, gains[k], self._signals) for k in range(first, first + self.control_steps)]
         self._steps += fresh
         self._number += self.control_steps
@@ -233,7 +233,7 @@ class SimulatedPlant:
         """Keep everything that the next steps depend on, and the run so far; for `restore_state`, on this plant."""
         need_running(self._number >= 0)
         steps = self._steps
-        return _Saved(self._number, self._loop.save(), self._first, self._seed, self._drawn, steps, len(steps))
+        return _Saved(self._number, self.loop.save(), self._first, self._seed, self._drawn, steps, len(steps))
 
     def restore_state(self, saved: Any) -> None:
         """Return to a saved state: what follows is bit for bit what followed then.
@@ -250,7 +250,7 @@ class SimulatedPlant:
         """
         if not isinstance(saved, _Saved) or len(saved.first) != len(self.zone_names):
             raise PlantError(describe("state", "what save_state of such a plant gave", type(saved).__name__))
-        self._loop.restore(saved.loop)
+        self.loop.restore(saved.loop)
         self._number, self._first, self._seed = saved.number, saved.first, saved.seed
         self._draw(saved.drawn)
         self._steps = saved.steps[: saved.count]
@@ -307,10 +307,28 @@ class SimulatedPlant:
         gains = float(self.scenario.gains[last.number].sum())
         return SystemBalance(energy_balance(self.system, last.conditions, last.done), gains, self.model.flows())
 
+    def outside(self, scenario: Scenario) -> FloatArray:
+        """Give what drives the building from outside: boundaries and signals of effects, shape (n_steps, n_outside).
+
+        Parameters
+        ----------
+        scenario : Scenario
+            The plant's own, or with other people.
+
+        Raises
+        ------
+        PlantError
+            When a signal is known only while the plant runs.
+        """
+        signals = self._given_signals
+        if scenario is not self.given and self.model.network.signals:
+            signals = EffectSignals(self.model.network, scenario, self.system)
+        return np.hstack([self.loop.boundary, signals.in_advance()])
+
     def _draw(self, seed: int | None) -> None:
         """Let other people come, those of a seed; None are those of the scenario as it was given."""
         if seed != self._drawn:
-            self.scenario = self._given if seed is None else self._given.redrawn(seed)
+            self.scenario = self.given if seed is None else self.given.redrawn(seed)
             self._gains, self._drawn = shared_rows(self.scenario.gains), seed
             self._signals = self._given_signals
             if seed is not None and self.model.network.signals:  # some may be those of people
@@ -322,7 +340,7 @@ class SimulatedPlant:
         return self._steps
 
     def _read(self, step: PlantStep, people: FloatArray, seed: int) -> FloatArray:
-        return self._sensors.read(step, people[step.number], seed)
+        return self.sensors.read(step, people[step.number], seed)
 
     def _seen(self, steps: list[PlantStep], seconds: int) -> Measurements:
         """Measurements of some steps, read when they are asked for."""
@@ -332,12 +350,12 @@ class SimulatedPlant:
             rows = [self._read(step, people, seed) for step in steps]
             return rows[0] if len(rows) == 1 else np.mean(rows, axis=0)
 
-        return Measurements(self._sensors.layout, seconds, values)
+        return Measurements(self.sensors.layout, seconds, values)
 
-    def _warmed_up(self) -> tuple[LoopState, PlantStep]:
+    def warmed_up(self) -> tuple[LoopState, PlantStep]:
         """State after the first day, run with expected people from a steady state, and its last step; once for all."""
         if self._warm is None:
-            loop, effects, gains = self._loop, self._given_signals, shared_rows(self._given.expected_gains)
+            loop, effects, gains = self.loop, self._given_signals, shared_rows(self.given.expected_gains)
             day = min(round(_DAY / self._step), self.scenario.grid.n_steps)
             loop.start(effects.known(0))
             begin = loop.save()

@@ -23,6 +23,7 @@ ANY_KEYWORD: dict[str, str] = {
     "thermal.system.system.HvacSystem.having": "names of its components; connections refuse others",
     "thermal.system.system.HvacSystem.with_component": "ports of the component; connections refuse others",
     "thermal.system.system.HvacSystem.start": "states of its components; an unknown one is refused with the nearest",
+    "mpc.environment.office.office_vector_environment": "options of office_environment, which refuses others",
     "thermal.system.plant.HvacPlant.start": "states of its components; an unknown one is refused with the nearest",
     **{
         f"thermal.components.{name}.sized": "refuses all: the class has no `sized` of its own"

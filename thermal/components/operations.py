@@ -239,6 +239,16 @@ class Operations:
         """
         raise NotImplementedError
 
+    def empty(self, count: int) -> Value:
+        """Make an array to be filled.
+
+        Parameters
+        ----------
+        count : int
+            Its length.
+        """
+        return np.empty(count)
+
     def gather(self, values: Value, members: NDArray[np.float64]) -> Value:
         """Sum the elements of each zone, which see no other zone; `members` is (n_element, n_zone) of 0 and 1.
 

@@ -184,9 +184,13 @@ class HvacPlant:
         """Check actions by the ranges of their actuators, and lay them out."""
         system, chosen = self.system, []
         for name in actions:
-            ModelError.unless_known(name, system.actuators, "actions", "an actuator")
+            if name not in system.actuators:
+                ModelError.unless_known(name, system.actuators, "actions", "an actuator")
         for name, (_, actuator) in system.actuators.items():
             value = actions.get(name, system.defaults.get(name))
+            if type(value) is float and actuator.lowest <= value <= actuator.highest:
+                chosen.append(value)
+                continue
             if not isinstance(value, float | int):
                 raise ModelError(name, f"a number of {actuator.unit}", repr(value))
             scalar_action(name, value, actuator.unit, actuator.lowest, actuator.highest)

@@ -3,13 +3,10 @@
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
-from thermal._types import FloatArray
 from thermal.case.points import POINT_TYPES
 from thermal.components.component import Calls, Component, Conditions
 from thermal.components.energy_balance import EnergyBalance
-from thermal.components.operations import StepOperations
+from thermal.components.operations import Operations, StepOperations, Value
 from thermal.system.exchange import givens
 from thermal.system.step import HvacStep
 from thermal.system.system import HvacSystem
@@ -44,7 +41,14 @@ class HvacPoints:
         #: Columns ``ENTITY/POINT`` in the order of `read`, point by point.
         self.columns = tuple(columns)
 
-    def read(self, conditions: Conditions, actions: Mapping[str, float], step: HvacStep) -> FloatArray:
+    def read(
+        self,
+        conditions: Conditions,
+        actions: Mapping[str, Value],
+        step: HvacStep,
+        ops: Operations | None = None,
+        out: Value = None,
+    ) -> Any:
         """Read all points after a step.
 
         Parameters
@@ -55,19 +59,23 @@ class HvacPoints:
             For the step, by ``ENTITY/point`` [unit of the actuator].
         step : HvacStep
             What happened.
+        ops : Operations, optional
+            Arithmetic; that of one step of a plant by default.
+        out : Value, optional
+            Array to be filled from its beginning.
 
         Returns
         -------
         numpy.ndarray, shape (n_column,)
             In the library's units: kelvin, kg/s, W, shares.
         """
-        system = self.system
+        system, ops = self.system, ops or self._ops
         given = givens(system, _NO_CALLS, conditions, actions, step.state, 0.0, _nowhere)
         values = {
-            name: component.read(self._ops, given[name], step.results[name])
+            name: component.read(ops, given[name], step.results[name])
             for name, component in system.components.items()
         }
-        found = np.empty(len(self.columns))
+        found = ops.empty(len(self.columns)) if out is None else out
         for place, name, k in self._read:
             found[place] = values[name][k]
         return found

@@ -121,7 +121,7 @@ class HvacSystem:
         """Zones that are heated or cooled."""
         return 1 + max(int(group.zone.max()) for group in self.groups.values())
 
-    def by_zone(self, values: FloatArray) -> FloatArray:
+    def by_zone(self, values: Value) -> Value:
         """Sum values of the terminals, one a zone, shape (n_zone,).
 
         Parameters
@@ -129,7 +129,12 @@ class HvacSystem:
         values : ndarray, shape (n_terminal,)
             Values [any].
         """
-        return np.bincount(self.terminals.zone, values, self.zone_count).astype(float)
+        return values if self.terminals.one_each == self.zone_count else values @ self._terminals_of_zones
+
+    @cached_property
+    def _terminals_of_zones(self) -> FloatArray:
+        """Terminals of each zone as 1 of 0 and 1, (n_terminal, n_zone)."""
+        return np.eye(self.zone_count)[self.terminals.zone]
 
     @cached_property
     def rooms(self) -> dict[str, FloatArray]:

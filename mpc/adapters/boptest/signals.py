@@ -87,7 +87,8 @@ class ObservedPlant(SimulatedPlant):
     @property
     def zone_temperature(self) -> FloatArray:
         """True temperatures of the zones now, shape (n_zone,) [K]."""
-        return self._loop.air
+        air: FloatArray = self.loop.air
+        return air
 
 
 def _signal_names(names: Iterable[str]) -> dict[str, str]:

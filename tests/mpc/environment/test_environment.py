@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from mpc.environment.environment import ControlEnvironment, Office, office_environment
+from mpc.environment.environment import ControlEnvironment
+from mpc.environment.office import Office, office_environment
 from mpc.environment.reward import EconomicReward, PaperStepReward
 from mpc.errors import MpcError, PlantActionError
 from mpc.kpi.record import PlantRecord

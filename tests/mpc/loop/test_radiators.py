@@ -30,7 +30,7 @@ def test_radiators_warm_their_zones_and_energy_closes() -> None:
     assert (gained[:3] > 0.02).all() and gained[:3].min() > np.abs(gained[6:]).max()
     frame = plant.telemetry()
     assert (frame[[f"RAD_{zone}/heating_power_sensor" for zone in warm]].max() > 100.0).all()
-    assert plant._loop._radiant  # what falls on surfaces goes there
+    assert plant.loop.radiant  # what falls on surfaces goes there
 
 
 def test_a_floor_takes_the_heat_of_its_heater_and_energy_closes() -> None:

@@ -26,7 +26,7 @@ def test_metered_heat_is_what_the_zones_received(make_plant: Drive, drive: Drive
     """By the case format's own formula, of the telemetry alone."""
     plant = drive(make_plant(), 150)
     metered = plant.case().zone_heat().to_numpy()
-    given = np.array([plant._loop.hvac.heat(step.done) for step in plant._steps])
+    given = np.array([plant.loop.hvac.heat(step.done) for step in plant._steps])
     np.testing.assert_allclose(metered, given, atol=1e-6)
 
 

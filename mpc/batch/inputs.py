@@ -1,0 +1,187 @@
+"""What drives many plants from outside, laid out before the first step: schedules, weather, people, prices, noise."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from mpc.batch.building import Array
+from mpc.loop.noise import BLOCK, NoiseSource
+from mpc.loop.simulated import SimulatedPlant
+from thermal._types import FloatArray, IntArray
+from thermal.units import REFERENCE_TEMPERATURE
+
+_TOGETHER = 32  # members whose noise is laid out together, so that what is drawn stays in the cache
+
+
+def plant_rows(plant: SimulatedPlant) -> dict[str, FloatArray]:
+    """Lay out what drives a plant, a row a step; temperatures of zones are counted from the reference temperature.
+
+    Parameters
+    ----------
+    plant : SimulatedPlant
+        The plant.
+    """
+    scenario, operation, n = plant.scenario, plant.operation, plant.scenario.grid.n_steps
+    prices = [getattr(scenario, f"{of}_{kind}") for kind in ("price", "carbon") for of in ("electricity", "gas")]
+    running = operation.running if operation.running.shape[1] else np.ones((n, 1))
+    return {
+        "heating": operation.heating - REFERENCE_TEMPERATURE,
+        "cooling": operation.cooling - REFERENCE_TEMPERATURE,
+        "running": operation.running,
+        "some_idle": (running.min(axis=1, keepdims=True) < 1.0) * 1.0,
+        "ventilation": operation.ventilation[:, None],
+        "outdoor": scenario.outdoor[:, None],
+        "weather": scenario.weather.frame.to_numpy(dtype=float),
+        "lower": scenario.lower - REFERENCE_TEMPERATURE,
+        "upper": scenario.upper - REFERENCE_TEMPERATURE,
+        "prices": np.column_stack(prices),
+        **people_rows(plant, plant.scenario),
+    }
+
+
+def people_rows(plant: SimulatedPlant, scenario: Any) -> dict[str, FloatArray]:
+    """Lay out what depends on who is in: people, their heat, and signals of effects.
+
+    Parameters
+    ----------
+    plant : SimulatedPlant
+        The plant.
+    scenario : Scenario
+        Its own, or with other people.
+    """
+    outside = plant.outside(scenario) - np.append(np.full(len(plant.model.network.boundaries), REFERENCE_TEMPERATURE),
+                                                  np.zeros(len(plant.model.network.signals)))  # fmt: skip
+    return {"gains": scenario.gains, "people": scenario.occupancy, "outside": outside}
+
+
+class DrivingRows:
+    """Rows of several plants' inputs, given out to members.
+
+    Parameters
+    ----------
+    tables : sequence of mapping of str to ndarray, shape (n_steps, width)
+        One a plant, with the same names and widths [any].
+    members : int
+        How many.
+    own : sequence of str
+        Names of what each member has for itself, drawn at its reset.
+    dtype : numpy.dtype
+        Precision.
+
+    Attributes
+    ----------
+    parts : dict of str to slice
+        Where each part stands in a row.
+    each : bool
+        Whether members may differ.
+    """
+
+    def __init__(
+        self, tables: Sequence[Mapping[str, FloatArray]], members: int, own: Sequence[str], dtype: Any
+    ) -> None:
+        self.parts, end, widths = dict[str, slice](), 0, {name: v.shape[1] for name, v in tables[0].items()}
+        for name in sorted(widths, key=lambda name: name in own):  # what is a member's own comes last
+            self.parts[name], end = slice(end, end + widths[name]), end + widths[name]
+        self.width, self.each, self._dtype = end, len(tables) > 1 or bool(own), np.dtype(dtype)
+        whole = [np.hstack([table[name] for name in self.parts]) for table in tables]
+        lengths = [len(table) for table in whole]
+        self.first = np.concatenate([[0], np.cumsum(lengths)[:-1]]).astype(np.intp)
+        self._rows = np.ascontiguousarray(np.vstack(whole), dtype=dtype)
+        self._names, self._common = tuple(own), end - sum(widths[name] for name in own)
+        self._own = np.zeros((members, max(lengths), end - self._common), dtype=dtype) if own else None
+        self._begin, self._last, self._numbers = (np.arange(members) * k for k in (0, 0, 1))
+        self._lengths = np.array(lengths)
+
+    def begin(self, member: int, plant: int, own: Mapping[str, FloatArray] | None) -> None:
+        """Tell which plant a member has.
+
+        Parameters
+        ----------
+        member, plant : int
+            Numbers.
+        own : mapping of str to ndarray, shape (n_steps, width), or None
+            What it has for itself [any].
+        """
+        self._begin[member], self._last[member] = self.first[plant], self._lengths[plant] - 1
+        if self._own is not None and own is not None:
+            for name in self._names:
+                part, values = self.parts[name], own[name]
+                self._own[member, : len(values), part.start - self._common : part.stop - self._common] = values
+
+    def fill(self, steps: IntArray, out: Array) -> None:
+        """Fill in the rows of a step of each member.
+
+        Parameters
+        ----------
+        steps : ndarray of int, shape (member,)
+            Numbers of the steps.
+        out : ndarray, shape (width, member or 1)
+            Filled.
+        """
+        if not self.each:
+            out[:, 0] = self._rows[min(int(steps[0]), len(self._rows) - 1)]
+            return
+        steps = np.minimum(steps, self._last)
+        np.copyto(out[: self._common], self._rows[self._begin + steps, : self._common].T)
+        if self._own is not None:
+            np.copyto(out[self._common :], self._own[self._numbers, steps].T)
+
+
+class DrawnNoise:
+    """Noise of many members, drawn for a block of steps at a time: each has the numbers that it has alone.
+
+    Parameters
+    ----------
+    source : NoiseSource
+        Of the plants.
+    members : int
+        How many.
+    dtype : numpy.dtype
+        Precision.
+    """
+
+    def __init__(self, source: NoiseSource, members: int, dtype: Any) -> None:
+        self.source, self._seeds = source, np.zeros(members, dtype=np.int64)
+        self._numbers = np.full(members, -1, dtype=np.int64)
+        self._drawn = np.zeros((BLOCK, source.width, members), dtype=dtype)
+        self._few = np.zeros((_TOGETHER, BLOCK * source.width), dtype=dtype)
+        self._members = np.arange(members)
+
+    def begin(self, member: int, seed: int) -> None:
+        """Give a member a seed.
+
+        Parameters
+        ----------
+        member, seed : int
+            Numbers.
+        """
+        self._seeds[member], self._numbers[member] = seed, -1
+
+    def fill(self, steps: IntArray, out: Array) -> None:
+        """Fill in the random numbers of a step of each member.
+
+        Parameters
+        ----------
+        steps : ndarray of int, shape (member,)
+            Numbers of the steps.
+        out : ndarray, shape (width, member)
+            Filled.
+        """
+        numbers, rows = np.divmod(steps, BLOCK)
+        if (stale := np.flatnonzero(numbers != self._numbers)).size:
+            self._draw(stale, numbers)
+        if rows[0] == rows[-1] and (rows == rows[0]).all():
+            np.copyto(out, self._drawn[rows[0]])
+        else:
+            np.copyto(out, self._drawn[rows, :, self._members].T)
+
+    def _draw(self, members: IntArray, numbers: IntArray) -> None:
+        for part in (members[k : k + _TOGETHER] for k in range(0, len(members), _TOGETHER)):
+            seeds = self._seeds[part].tolist()
+            for row, (number, seed) in enumerate(zip(numbers[part].tolist(), seeds, strict=True)):
+                self._few[row] = self.source.block(number, seed).ravel()
+            columns = self._drawn.reshape(-1, self._drawn.shape[-1])
+            together = part[0] + len(part) - 1 == part[-1]
+            columns[:, slice(part[0], part[-1] + 1) if together else part] = self._few[: len(part)].T
+        self._numbers[members] = numbers[members]

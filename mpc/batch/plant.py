@@ -1,0 +1,365 @@
+"""Many plants of one structure, stepped together."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mpc.batch.building import Array, BatchedBuilding
+from mpc.batch.inputs import DrawnNoise, DrivingRows, people_rows, plant_rows
+from mpc.batch.step import Score, TracedStep
+from mpc.errors import PlantActionError, PlantError
+from mpc.kpi.record import PlantRecord
+from mpc.loop.plant import need_running
+from mpc.loop.reduced import ReducedBuilding
+from mpc.loop.simulated import SimulatedPlant
+from thermal._types import FloatArray, IntArray
+from thermal.batch.program import Program
+from thermal.units import REFERENCE_TEMPERATURE
+
+
+class BatchedPlant:
+    """Plants of one structure, stepped together: each member has one of several plants and a seed.
+
+    The equations are those of `SimulatedPlant`, traced once and run on arrays whose last axis is of members. Plants may
+    differ in what drives them, people, and in the parameters and effects of their buildings; HVAC system and schedules'
+    rules are common.
+
+    Parameters
+    ----------
+    plants : SimulatedPlant or sequence of SimulatedPlant
+        On reduced buildings, with the same measurements, actuators and steps.
+    members : int
+        How many are stepped.
+    actions : sequence of str, optional
+        Actuators that are set, by ``ENTITY/POINT``; those that every action must have by default.
+    dtype : type
+        ``numpy.float32`` (default), or ``numpy.float64``.
+    score : callable, optional
+        What a step is worth, of `StepValues`; see `rewards`.
+    record : bool
+        Whether the run is kept, for `record`: four bytes a zone, member and step in single precision.
+    compiled : bool
+        As in `thermal.batch.program.Program`.
+
+    Raises
+    ------
+    PlantError
+        When plants do not fit each other, are stepped on the grid, have thermostats that remember, emitters that
+        radiate, or effects whose signals are known only while they run.
+
+    Examples
+    --------
+    >>> many = BatchedPlant(plant, 512)  # doctest: +SKIP
+    >>> measured = many.reset(seeds=np.arange(512))  # doctest: +SKIP
+    >>> measured = many.step(np.full((3, 512), 290.0))  # doctest: +SKIP
+    """
+
+    def __init__(
+        self,
+        plants: SimulatedPlant | Sequence[SimulatedPlant],
+        members: int,
+        *,
+        actions: Sequence[str] | None = None,
+        dtype: Any = np.float32,
+        score: Score | None = None,
+        record: bool = True,
+        compiled: bool = False,
+    ) -> None:
+        self.plants = checked_plants(plants)
+        first, self.members, self.dtype = self.plants[0], members, np.dtype(dtype)
+        self.actions = tuple(actions or (a.name for a in first.actuators if a.required))
+        known = {a.name: a for a in first.actuators}
+        for name in self.actions:
+            PlantActionError.unless_known(name, known, "actions", "an actuator of the plants")
+        chosen = [known[name] for name in self.actions]
+        self._lowest, self._highest = (np.array([[getattr(a, end)] for a in chosen]) for end in ("lowest", "highest"))
+        self._random_people = any(
+            not np.array_equal(p.scenario.redrawn(0).occupancy, p.scenario.redrawn(1).occupancy) for p in self.plants
+        )
+        models, self._model_of = different_models([p.model for p in self.plants])  # type: ignore[misc]
+        own = ("gains", "people", "outside") if self._random_people else ()
+        self._rows = DrivingRows([plant_rows(p) for p in self.plants], members, own, dtype)
+        self._building = BatchedBuilding(models, members, dtype)
+        self._traced = TracedStep(
+            first, self._rows.parts, self._rows.width, self._rows.each, self.actions, self._building, score,
+            len(models) > 1,
+        )  # fmt: skip
+        self._program = Program(self._traced.tape, members, dtype, compiled)
+        noise = first.sensors.noise
+        self._noise = None if noise is None else DrawnNoise(noise, members, dtype)
+        #: Which plant and seed each member has, and the number of the step that comes next, shape (member,).
+        self.plant_of, self.seeds, self.now = (np.zeros(members, dtype=np.intp) for _ in range(3))
+        self._started = False
+        self._lengths = np.array([p.scenario.grid.n_steps for p in self.plants])
+        self._longest = int(self._lengths.max())
+        self._history: tuple[Array, Array] | None = None
+        self._recording = record
+
+    @property
+    def operations(self) -> int:
+        """Instructions of a step."""
+        return len(self._program)
+
+    @property
+    def zone_temperature(self) -> FloatArray:
+        """Air of the zones, shape (n_zone, member) [K]."""
+        return np.asarray(self._of("zone"), dtype=float) + REFERENCE_TEMPERATURE
+
+    @property
+    def zone(self) -> Array:
+        """The same counted from the reference temperature; not to be kept, the next step writes to it."""
+        return self._of("zone")
+
+    @property
+    def powers(self) -> Array:
+        """Electricity and fuel of the last step, shape (2, member) [W]; the next step writes to it."""
+        return self._of("powers")
+
+    @property
+    def rewards(self) -> Array:
+        """What the last step was worth, shape (member,); the next step writes to it."""
+        return self._of("reward")
+
+    @property
+    def measured(self) -> Array:
+        """What was measured in the last step, shape (n_column, member) [library's units]; the next one writes to it."""
+        return self._of("measured")
+
+    def _of(self, name: str) -> Array:
+        return self._program.of(getattr(self._traced.results, name))
+
+    def _set(self, name: str) -> Array:
+        return self._program.of(getattr(self._traced.inputs, name))
+
+    def reset(
+        self, seeds: ArrayLike, plants: ArrayLike | None = None, members: ArrayLike | None = None
+    ) -> Array:
+        """Start members anew, after the warm-up of their plants.
+
+        Parameters
+        ----------
+        seeds : array_like of int, shape (n,)
+            Of people and noise, 0 or more.
+        plants : array_like of int, shape (n,), optional
+            Which plant each has; the first by default.
+        members : array_like of int, shape (n,), optional
+            Which ones; all by default.
+
+        Returns
+        -------
+        ndarray, shape (n_column, member)
+            Measurements of all, as `SimulatedPlant.reset` gives them.
+        """
+        who = np.arange(self.members) if members is None else np.atleast_1d(np.asarray(members, dtype=np.intp))
+        seed = np.broadcast_to(np.asarray(seeds, dtype=np.int64), who.shape)
+        which = np.zeros(len(who), dtype=np.intp) if plants is None else np.broadcast_to(np.asarray(plants), who.shape)
+        valid = len(seed) == 0 or (seed.min() >= 0 and 0 <= which.min() and which.max() < len(self.plants))
+        expected = f"seeds of 0 or more and plants from 0 to {len(self.plants) - 1}"
+        PlantError.unless(valid, "reset", expected, "others")
+        together = self._rows.each or len(who) == self.members
+        PlantError.unless(together, "reset", "all members of one plant at once", f"{len(who)} of {self.members}")
+        if self._recording and (self._history is None or len(who) == self.members):
+            n = len(self.plants[0].zone_names)
+            self._history = (np.zeros((self._longest + 1, n, self.members), self.dtype),
+                             np.zeros((self._longest, 2, self.members), self.dtype))  # fmt: skip
+        self.plant_of[who], self.seeds[who], self.now[who], self._started = which, seed, 0, True
+        for number in np.unique(which).tolist():
+            self._start(number, who[which == number])
+        return self.measured
+
+    def _start(self, number: int, who: IntArray) -> None:
+        plant, index = self.plants[number], who.tolist()
+        warm, last = plant.warmed_up()
+        state, _ = warm.building
+        self._building.start(who, np.full(len(who), self._model_of[number]), [state] * (self._model_of[number] + 1))
+        columns = {
+            "reading": warm.reading - REFERENCE_TEMPERATURE, "missed": warm.missed,
+            "cycling": np.array(warm.cycling, dtype=float), "states": np.array(warm.hvac.values),
+        }  # fmt: skip
+        for name, values in columns.items():
+            self._set(name)[:, who] = values[:, None]
+        several = not self._building.shared
+        for name, values in (("offset", plant.loop.offset), ("response", plant.loop.local.response)):
+            self._set(name)[:, who if several else [0]] = values[:, None]
+        air = warm.reading - plant.loop.offset - REFERENCE_TEMPERATURE
+        self._of("zone")[:, who] = air[:, None]
+        if self._history is not None:
+            self._history[0][0][:, who] = air[:, None]
+        for member in index:
+            seed = int(self.seeds[member])
+            scenario = plant.given.redrawn(seed) if self._random_people else plant.given
+            self._rows.begin(member, number, people_rows(plant, scenario) if self._random_people else None)
+            if self._noise is not None:
+                self._noise.begin(member, seed)
+            self.measured[:, member] = plant.sensors.read(last, scenario.occupancy[last.number], seed)
+
+    def step(self, setpoints: Array, idle: NDArray[np.bool_] | None = None) -> Array:
+        """Hold setpoints for a step of the plants.
+
+        Parameters
+        ----------
+        setpoints : ndarray, shape (n_action, member)
+            In the order of `actions` [K] or [Pa].
+        idle : ndarray of bool, shape (member,), optional
+            Members whose scenario may be over, as they will be reset: what becomes of them says nothing.
+
+        Returns
+        -------
+        ndarray, shape (n_column, member)
+            What was measured; the next step writes to it.
+
+        Raises
+        ------
+        PlantActionError
+            When a setpoint is missing, no number or out of its range.
+        PlantError
+            When a scenario is over, or `reset` was not called.
+        """
+        need_running(self._started)
+        expected = (len(self.actions), self.members)
+        PlantActionError.unless(setpoints.shape == expected, "setpoints", f"shape {expected}", f"{setpoints.shape}")
+        slack = 1e-6 * self._highest  # of single precision
+        if not ((setpoints >= self._lowest - slack) & (setpoints <= self._highest + slack)).all():
+            k = int(np.argmin(((setpoints >= self._lowest - slack) & (setpoints <= self._highest + slack)).all(axis=1)))
+            ends = f"{self._lowest[k, 0]:g} to {self._highest[k, 0]:g}"
+            found = f"{setpoints[k].min()} to {setpoints[k].max()}"
+            raise PlantActionError(f"action {self.actions[k]}", f"numbers from {ends}", found)
+        over = self.now >= self._lengths[self.plant_of]
+        if over.any() and not (over & ~idle if idle is not None else over).sum() == 0:
+            raise PlantError("scenario", "one more step", f"none left of {over.sum()} members", "reset them")
+        self._rows.fill(self.now, self._set("row"))
+        if self._noise is not None:
+            self._noise.fill(self.now, self._set("noise"))
+        np.copyto(self._set("actions"), setpoints, casting="same_kind")
+        self._program.run()
+        if self._history is not None:
+            self._keep()
+        self.now += 1
+        return self.measured
+
+    def _keep(self) -> None:
+        zones, powers = self._history or (self.zone, self.powers)
+        first = int(self.now[0])
+        if (self.now == first).all():
+            zones[first + 1], powers[first] = self.zone, self.powers
+        else:
+            every = np.flatnonzero(self.now < self._longest)
+            at = self.now[every]
+            zones[at + 1, :, every], powers[at, :, every] = self.zone.T[every], self.powers.T[every]
+
+    def record(self, member: int) -> PlantRecord:
+        """Give the run of a member since its reset, for indicators.
+
+        Parameters
+        ----------
+        member : int
+            Which.
+
+        Raises
+        ------
+        PlantError
+            When runs are not kept, or there was no step yet.
+        """
+        return record_of(self._history, member, int(self.now[member]), float(self.plants[0].scenario.grid.step))
+
+    @property
+    def history(self) -> tuple[Array, Array] | None:
+        """Zones at the edges of steps, counted from the reference temperature [K], and powers [W], with `record`."""
+        return self._history
+
+
+def record_of(history: tuple[Array, Array] | None, member: int, steps: int, seconds: float) -> PlantRecord:
+    """Give the run of a member out of the history of all.
+
+    Parameters
+    ----------
+    history : tuple of ndarray or None
+        As `BatchedPlant.history`.
+    member, steps : int
+        Which, and how many steps it has made.
+    seconds : float
+        Step of the plant [s].
+    """
+    if history is None or steps < 1:
+        raise PlantError("run", "one that is kept, of a step at least", "none", "make the batch with record=True")
+    zones, powers = history
+    kept = zones[: steps + 1, :, member].astype(float) + REFERENCE_TEMPERATURE
+    electricity, gas = powers[:steps, :, member].astype(float).T
+    return PlantRecord(seconds, kept, electricity, gas)
+
+
+def different_models(models: Sequence[ReducedBuilding]) -> tuple[list[ReducedBuilding], IntArray]:
+    """Find which reduced buildings differ.
+
+    Parameters
+    ----------
+    models : sequence of ReducedBuilding
+        One a plant.
+
+    Returns
+    -------
+    tuple
+        Those that differ, and which of them each is.
+    """
+    found, place = list[ReducedBuilding](), list[int]()
+    for model in models:
+        mine = model.step_matrices()
+        same = [k for k, other in enumerate(found) if other is model or
+                all(np.array_equal(a, b) for a, b in zip(mine, other.step_matrices(), strict=True))]  # fmt: skip
+        place.append(same[0] if same else len(found))
+        found += [] if same else [model]
+    return found, np.array(place, dtype=np.intp)
+
+
+def checked_plants(plants: Any) -> tuple[SimulatedPlant, ...]:
+    """Refuse plants that cannot be stepped together.
+
+    Parameters
+    ----------
+    plants : SimulatedPlant or sequence of SimulatedPlant
+        The plants, or what is none.
+
+    Raises
+    ------
+    PlantError
+        Which plant does not fit, and why.
+    """
+    every = (plants,) if isinstance(plants, SimulatedPlant) else tuple(plants)
+    PlantError.unless(bool(every), "batch", "a plant or more", "none")
+    first = every[0]
+    for k, plant in enumerate(every):
+        where, kind = f"batch: plant {k}", type(getattr(plant, "model", plant)).__name__
+        PlantError.unless(isinstance(getattr(plant, "model", None), ReducedBuilding), where,
+                          "one on a reduced building", kind, "take kind='reduced'")  # fmt: skip
+        for what in ("columns", "actuators", "control_steps", "zone_names"):
+            same = getattr(plant, what) == getattr(first, what)
+            PlantError.unless(same, where, f"the same {what.replace('_', ' ')} as plant 0", "others")
+        same = same_system(plant.system, first.system) and plant.scenario.grid.step == first.scenario.grid.step
+        PlantError.unless(same, where, "the HVAC system and step of plant 0", "others")
+        signals = [[s.name for s in p.model.network.signals] for p in (plant, first)]
+        PlantError.unless(signals[0] == signals[1], where, "the signals of effects of plant 0", "others")
+        noise = [None if p.sensors.noise is None else p.sensors.noise.noise for p in (plant, first)]
+        PlantError.unless(noise[0] == noise[1], where, "the noise of plant 0", "another")
+    return every
+
+
+def same_system(one: Any, other: Any) -> bool:
+    """Tell whether two components, systems or parameters are the same in all that they are made of.
+
+    Parameters
+    ----------
+    one, other : object
+        Any.
+    """
+    if one is other:
+        return True
+    if isinstance(one, np.ndarray):
+        return isinstance(other, np.ndarray) and np.array_equal(one, other)
+    names = getattr(one, "__dataclass_fields__", None)
+    if names is not None:
+        return type(one) is type(other) and all(same_system(getattr(one, k), getattr(other, k)) for k in names)
+    if isinstance(one, dict):
+        return isinstance(other, dict) and list(one) == list(other) and all(same_system(one[k], other[k]) for k in one)
+    return bool(one == other)

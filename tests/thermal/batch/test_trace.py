@@ -1,0 +1,99 @@
+"""Equations of one member, traced and run for many, give what they give one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from thermal.batch.operations import TracedOperations
+from thermal.batch.program import Program
+from thermal.batch.trace import Tape
+from thermal.components.operations import NumpyOperations, Operations
+from thermal.errors import ModelError
+
+GROUPS = np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 0.0]])
+
+
+def equations(ops: Operations, x: Any, y: Any) -> Any:
+    """Something of everything, of an array of three and a number."""
+    sums = ops.sums(x * y, GROUPS)
+    spread = ops.spread([s + 1.0 for s in sums], np.array([0, 1, 0]))
+    part = ops.step(x - 0.5) * ops.clip(x, 0.2, 0.8) + ops.lesser(spread, 3.0)
+    chosen = np.where(part > y, part**2, ops.exp(-part))
+    chosen = np.maximum(chosen, np.array([0.1, 0.2, 0.3])) / (1.0 + ops.dot(x, np.array([1.0, 2.0, 3.0])))
+    lines = np.stack([chosen, x, np.ones(3)])
+    return (lines[1:] - lines[:-1]).sum(axis=0) + lines.max(axis=0) + chosen[np.array([2, 0, 1])]
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize("each", [True, False])
+def test_many_at_once_are_as_one_by_one(dtype: Any, each: bool) -> None:
+    tape = Tape()
+    x, y = tape.value(3), tape.value(each=each)
+    result = tape.keep(equations(TracedOperations(tape), x, y), 3)
+    program, rng = Program(tape, 5, dtype), np.random.default_rng(0)
+    for _ in range(2):  # a second run finds the memory as the first left it
+        xs, ys = rng.uniform(0.0, 1.0, (3, 5)), rng.uniform(0.0, 1.0, 5 if each else 1)
+        program.of(x)[...], program.of(y)[...] = xs, ys
+        program.run()
+        ones = [equations(NumpyOperations(), xs[:, k], ys[k % len(ys)]) for k in range(5)]
+        np.testing.assert_allclose(program.of(result).T, ones, rtol=1e-14 if dtype is np.float64 else 2e-6)
+
+
+def test_what_is_asked_twice_is_done_once() -> None:
+    tape = Tape()
+    x = tape.value(3)
+    tape.keep(np.exp(x + 1.0) + np.exp(x + 1.0), 3)
+    with_all = len(Program(tape, 2))
+    unused = np.sin(x)
+    assert unused.shape == (3,) and len(Program(tape, 2)) == with_all  # nobody wants it
+    # x is set from outside, so that it may change: what is read from it is read anew
+    assert with_all == 6
+
+
+def test_memory_is_used_again_without_harm() -> None:
+    tape = Tape()
+    x = tape.value(4)
+    value = x * 1.0
+    for k in range(50):
+        value = value + x * float(k)
+    result = tape.keep(value, 4)
+    program = Program(tape, 3)
+    program.of(x)[...] = 1.0
+    program.run()
+    assert (program.of(result) == 1.0 + sum(range(50))).all()
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (lambda x: 1.0 if x > 0.0 else 2.0, "without branches on values"),
+        (lambda x: np.sort(x), "numpy.sort"),
+        (lambda x: np.add.accumulate(x), "accumulate"),
+    ],
+)
+def test_what_cannot_be_traced_says_so(wrong: Callable[[Any], Any], words: str) -> None:
+    with pytest.raises(ModelError, match=words):
+        wrong(Tape().value(3)[0] if "branches" in words else Tape().value(3))
+
+
+def test_a_result_is_not_written_to() -> None:
+    x = Tape().value(3)
+    with pytest.raises(ModelError, match="may be written to"):
+        (x + 1.0)[0] = 2.0
+
+
+def test_compiled_runs_are_the_same() -> None:
+    pytest.importorskip("numba", reason="needs the extra [fast]")
+    tape = Tape()
+    x, y = tape.value(3), tape.value()
+    result = tape.keep(equations(TracedOperations(tape), x, y), 3)
+    plain, compiled, rng = Program(tape, 4), Program(tape, 4, compiled=True), np.random.default_rng(1)
+    xs, ys = rng.uniform(0.0, 1.0, (3, 4)), rng.uniform(0.0, 1.0, 4)
+    for program in (plain, compiled):
+        program.of(x)[...], program.of(y)[...] = xs, ys
+        program.run()
+    np.testing.assert_allclose(compiled.of(result), plain.of(result), rtol=1e-15)

@@ -1,0 +1,177 @@
+"""What was traced, carried out on all members at once in memory that is laid out before."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+from functools import partial
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal.batch.compiled import compile_run, compiles
+from thermal.batch.trace import Instruction, Slot, Tape, Traced, View
+from thermal.errors import ModelError
+
+_LINE = 64  # bytes of a cache line, which arrays begin at
+
+
+class Program:
+    """Runs the notes of a tape on arrays ``(..., member)``, each instruction for all members.
+
+    Parameters
+    ----------
+    tape : Tape
+        What is to be done.
+    members : int
+        How many there are.
+    dtype : type
+        ``numpy.float64``, or ``numpy.float32``, which is twice as fast.
+    compiled : bool
+        Whether numba compiles runs of plain arithmetic (extra ``[fast]``), which takes some seconds; otherwise each
+        instruction is a call of NumPy.
+
+    Notes
+    -----
+    A value that nobody needs any more gives its place to a later one of the same shape, so that a run stays in the
+    processor's cache; an instruction on elements may write where one of its inputs lies.
+    """
+
+    def __init__(self, tape: Tape, members: int, dtype: Any = np.float64, compiled: bool = False) -> None:
+        ModelError.unless(members >= 1, "batch", "1 member or more", repr(members))
+        self.members, self.dtype, self._compiled = members, np.dtype(dtype), compiled
+        notes = _needed(tape)
+        notes = _grouped(notes) if compiled else notes
+        self._work, self._end = self._memory(tape, notes), 0
+        self._arrays: dict[int, NDArray[Any]] = {k: self._array(tape.slots[k]) for k in sorted(tape.kept)}
+        self._constants: dict[Any, NDArray[Any]] = {}
+        run = self._laid_out(tape, notes)
+        self._count, self._code = len(run), list[Callable[[], Any]]()
+        for plain, part in groupby(run, key=lambda step: compiled and compiles(step[0])):
+            steps = list(part)
+            if plain:
+                self._code += compile_run(self._work, steps)
+            else:
+                self._code += [partial(function, *inputs, out=output) for function, inputs, output in steps]
+
+    def __len__(self) -> int:
+        return self._count
+
+    def of(self, value: Traced) -> NDArray[Any]:
+        """Give the array of a kept value, to read or to set.
+
+        Parameters
+        ----------
+        value : Traced
+            Of the tape, kept.
+        """
+        return self._arrays[value.view.slot.number]
+
+    def run(self) -> None:
+        """Carry out everything once."""
+        for instruction in self._code:
+            instruction()
+
+    def _laid_out(
+        self, tape: Tape, notes: Sequence[Instruction]
+    ) -> list[tuple[Any, tuple[Any, ...], NDArray[Any]]]:
+        """Give each value a place for as long as it is needed."""
+        last = {v.slot.number: n for n, note in enumerate(notes) for v in _views(note)}
+        free: dict[Any, list[NDArray[Any]]] = defaultdict(list)
+        run = []
+        for n, note in enumerate(notes):
+            inputs = {v.slot.number: v.slot for v in note.inputs if isinstance(v, View)}
+            own = note.output.slot
+            ended = [s for k, s in inputs.items() if last[k] == n and k not in tape.kept and k != own.number]
+            operands = tuple(self._operand(v) for v in note.inputs)
+            in_place = isinstance(note.function, np.ufunc) and note.function is not np.matmul
+            if not in_place and own.number not in self._arrays:
+                self._arrays[own.number] = self._place(own, free)
+            for slot in ended:
+                free[_form(slot)].append(self._arrays[slot.number])
+            if own.number not in self._arrays:
+                self._arrays[own.number] = self._place(own, free)
+            run.append((note.function, operands, self._operand(note.output)))
+            if last[own.number] == n and own.number not in tape.kept:
+                free[_form(own)].append(self._arrays[own.number])
+        return run
+
+    def _place(self, slot: Slot, free: dict[Any, list[NDArray[Any]]]) -> NDArray[Any]:
+        spare = free[_form(slot)]
+        return spare.pop() if spare else self._array(slot)
+
+    def _memory(self, tape: Tape, notes: Sequence[Instruction]) -> NDArray[Any]:
+        """Memory for all values, were none to take another's place; what is not used costs nothing."""
+        numbers = {v.slot.number for note in notes for v in _views(note)} | tape.kept
+        values = sum(self._room(self._shape(tape.slots[k])) for k in numbers)
+        arrays = (v for note in notes for v in note.inputs if isinstance(v, np.ndarray))
+        return np.zeros(values + sum(self._room(v.shape) for v in arrays) + _LINE, dtype=self.dtype)
+
+    def _shape(self, slot: Slot) -> tuple[int, ...]:
+        return (*slot.shape, self.members if slot.each else 1)
+
+    def _room(self, shape: tuple[int, ...]) -> int:
+        line = _LINE // self.dtype.itemsize
+        return int(-(-int(np.prod(shape)) // line) * line)
+
+    def _array(self, slot: Slot) -> NDArray[Any]:
+        if slot.truth and not self._compiled:
+            return np.zeros(self._shape(slot), dtype=bool)
+        return self._take(self._shape(slot))
+
+    def _take(self, shape: tuple[int, ...]) -> NDArray[Any]:
+        begin, self._end = self._end, self._end + self._room(shape)
+        return self._work[begin : begin + int(np.prod(shape))].reshape(shape)
+
+    def _operand(self, operand: Any) -> Any:
+        if isinstance(operand, View):
+            array = self._arrays[operand.slot.number]
+            for index in operand.path:
+                array = array[index]
+            return array
+        if not isinstance(operand, np.ndarray):
+            return operand
+        key = id(operand)
+        if key not in self._constants:
+            self._constants[key] = self._take(operand.shape)
+            self._constants[key][...] = operand
+        return self._constants[key]
+
+
+def _form(slot: Slot) -> tuple[Any, ...]:
+    return slot.shape, slot.each, slot.truth
+
+
+def _views(note: Instruction) -> list[View]:
+    return [*(v for v in note.inputs if isinstance(v, View)), note.output]
+
+
+def _needed(tape: Tape) -> list[Instruction]:
+    """Instructions that something kept follows from."""
+    wanted, found = set(tape.kept), list[Instruction]()
+    for note in reversed(tape.notes):
+        if note.output.slot.number in wanted:
+            wanted |= {v.slot.number for v in note.inputs if isinstance(v, View)}
+            found.append(note)
+    return found[::-1]
+
+
+def _grouped(notes: Sequence[Instruction]) -> list[Instruction]:
+    """Order instructions so that plain arithmetic comes in few long runs; none passes what it depends on."""
+    left, done, plain = list(notes), list[Instruction](), True
+    while left:
+        waiting, read, written = list[Instruction](), set[int](), set[int]()
+        for note in left:
+            takes = {v.slot.number for v in note.inputs if isinstance(v, View)}
+            gives = note.output.slot.number
+            free = not (takes & written) and gives not in written and gives not in read
+            if free and compiles(note.function) == plain:
+                done.append(note)
+            else:
+                waiting.append(note)
+                read |= takes
+                written.add(gives)
+        left, plain = waiting, not plain
+    return done
