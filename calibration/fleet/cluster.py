@@ -62,6 +62,7 @@ class ClusterExecutor(Executor):
             raise CalibrationError("scheduler: expected an address such as tcp://HOST:8786, got none")
         self._client = _connected(scheduler, timeout)
         self._address, self._patience = scheduler, patience
+        self.connection = 0  # how often it was made anew
         try:
             self._check_workers(timeout, [str(Path(folder).resolve()) for folder in folders])
         except BaseException:
@@ -84,11 +85,19 @@ class ClusterExecutor(Executor):
         future: Future[T] = self._executor.submit(_unpacking(), message)
         return future
 
+    @property
+    def ready(self) -> bool:
+        """Whether calls can be submitted: not while a lost scheduler is waited for."""
+        return bool(self._client.status == "running")
+
     def trouble(self) -> str | None:
-        """Say why no more answers will come, if that is so."""
-        if self._client.status == "closed":
-            return f"scheduler {self._address}: the connection was lost"
+        """Say why no more answers will come, if that is so; a scheduler that is there again is taken up again."""
         now = time.monotonic()
+        if self._client.status == "closed":
+            self._connect_again()
+        if not self.ready:
+            lost = now - self._seen > self._patience
+            return f"scheduler {self._address}: the connection was lost for {self._patience:g} s" if lost else None
         if now - self._looked > LOOK or now - self._seen > self._patience:
             self._looked, workers = now, self._workers()
             if workers:
@@ -97,6 +106,13 @@ class ClusterExecutor(Executor):
                 what = "did not answer" if workers is None else "had no worker"
                 return f"scheduler {self._address}: {what} for {self._patience:g} s"
         return None
+
+    def _connect_again(self) -> None:
+        """Connect to a scheduler that was started again at the same address, if there is one yet."""
+        with suppress(CalibrationError):
+            self._client = _connected(self._address, LOOK)
+            self._executor = self._client.get_executor(pure=False)
+            self.connection += 1
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """Close the connection; the cluster itself stays.

@@ -2,41 +2,26 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import nullcontext
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
-
-import typer
+from typing import TYPE_CHECKING, Annotated, Any
 
 from calibration.errors import CalibrationError
-from mpc import plugins
-from mpc.cli import options
+from mpc.cli import many, options
 from mpc.cli.console import Progress, Waiting, answer, complain, say, show_table
 
 if TYPE_CHECKING:
     from calibration.diagnosis.diagnosis import Diagnosis
     from calibration.fit.result import CalibrationResult
-    from calibration.fleet.case import CaseOutcome
-    from calibration.fleet.job import Files
-
-_BUILDING = "building.yaml"
-
-Workers = Annotated[int | None, options.value("Processes that share a folder of cases; default: one a core.")]
-Scheduler = Annotated[
-    str | None, options.value("Of a dask cluster for a folder of cases, such as tcp://10.0.0.1:8786.", "ADDRESS")
-]
-
 #: Candidates on the terminal; the page and diagnosis.json have them all.
 _MOST_CANDIDATES = 5
 
 
 def calibrate(
-    case: Annotated[Path, typer.Argument(metavar="CASE", help="Case folder, or a folder of case folders.")],
+    case: many.Cases,
     out: Annotated[
-        Path,
+        str,
         options.folder(
             "calibration.json, evaluation.json, predictions.parquet, report.html; of a folder of cases one such folder "
             "a case, and summary.json"
@@ -58,8 +43,13 @@ def calibrate(
     loss: Annotated[str, options.value("linear, or pseudo_huber against outliers.", "LOSS")] = "linear",
     starts: Annotated[int, options.value("Starts of the solver; the best is kept.")] = 3,
     seed: Annotated[int, options.value("Seed of the further starts.")] = 0,
-    workers: Workers = None,
-    scheduler: Scheduler = None,
+    priors: Annotated[
+        Path | None, options.file("What a fleet taught, of `buildingmpc priors`; default: physical ranges.")
+    ] = None,
+    workers: many.Workers = None,
+    scheduler: many.Scheduler = None,
+    retries: many.Retries = 2,
+    limit: many.Limit = None,
     force: options.Force = False,
     json: options.Json = False,
 ) -> int:  # fmt: skip
@@ -78,12 +68,17 @@ def calibrate(
         "structure": {"lumped": True, "sun": True} if structure == "lumped" else {},
     }  # fmt: skip
     CalibrationError.unless_known(structure, ("chosen", "drawn", "lumped"), "--structure", "chosen, drawn or lumped")
-    if cases := _cases_in(case, out, workers, scheduler):
-        return _many("calibrate", cases, out, settings, workers, scheduler, force, json)
+    if priors is not None:
+        from calibration.evaluation.population import read_population
+
+        settings["population"] = read_population(priors)
+    how = many.How(workers, scheduler, retries, limit, force, json)
+    if (code := many.of_folder("calibrate", case, out, settings, how)) is not None:
+        return code
     from mpc.reports.calibration import calibration_content
 
-    with Waiting(f"calibrate {case.name}") as progress:
-        result, report = run_calibration(case, out, force, progress, settings)
+    with Waiting(f"calibrate {Path(case).name}") as progress:
+        result, report = run_calibration(Path(case), Path(out), force, progress, settings)
     answer(json, calibration_content(result), lambda: _show(result), report)
     return _exit_code(result)
 
@@ -151,98 +146,10 @@ def _exit_code(result: CalibrationResult) -> int:
     return 1
 
 
-def _cases_in(folder: Path, out: Path, workers: int | None, scheduler: str | None) -> Sequence[Path]:
-    """Cases in a folder of cases; none where it is a case itself."""
-    from calibration.fleet.run import case_folders
-
-    if workers is not None and scheduler is not None:
-        raise CalibrationError("--workers and --scheduler: expected one of them; a cluster has workers of its own")
-    if (folder / _BUILDING).exists() or not (cases := case_folders(folder)):
-        if workers is not None or scheduler is not None:
-            raise CalibrationError(
-                f"{folder}: --workers and --scheduler are for a folder of cases, one folder each; expected {_BUILDING} "
-                "in some of its folders, and not beside them"
-            )
-        return ()
-    inside = [p for p in sorted(folder.iterdir()) if p.is_dir() and p.name[0] != "."]
-    others = [p.name for p in inside if p not in cases and p != out]
-    if others:
-        complain(f"left out, for want of {_BUILDING}: {', '.join(others)}")
-    return cases
-
-
-def _many(
-    what: Literal["calibrate", "diagnose"], cases: Sequence[Path], out: Path, settings: dict[str, Any],
-    workers: int | None, scheduler: str | None, force: bool, json: bool,
-) -> int:  # fmt: skip
-    """Calibrate or diagnose each case into a folder of its name; one that fails is reported beside the others."""
-    from calibration.fleet.cluster import ClusterExecutor
-    from mpc.reports.display import Displayed, display
-
-    do: Callable[..., Sequence[CaseOutcome]]
-    files: Files
-    if what == "calibrate":
-        from calibration.fleet.run import calibrate_many
-        from mpc.reports.calibration import calibration_files
-
-        do, files = calibrate_many, calibration_files
-    else:
-        from calibration.fleet.diagnose import diagnose_many
-        from mpc.reports.diagnosis import diagnosis_files
-
-        do, files = diagnose_many, diagnosis_files
-    cluster = nullcontext() if scheduler is None else ClusterExecutor(scheduler, folders=[cases[0].parent])
-    try:
-        with Waiting(f"{what} cases") as waiting, cluster as executor:
-            outcomes = do(
-                cases, out, settings, files=plugins.WithPlugins(Displayed(files, display()), plugins.loaded),
-                workers=executor or workers, force=force,
-                progress=lambda _, done, total: waiting(f"{done} of {total}", done, total),
-            )  # fmt: skip
-    except KeyboardInterrupt:
-        complain(f"interrupted: what is finished is in {out}, and the same command goes on from there")
-        raise
-    for outcome in outcomes:
-        if outcome.error is not None:
-            complain(f"error: {outcome.case}: {outcome.error}: {outcome.message}")
-        elif outcome.solver is not None and outcome.status == "not_converged":
-            name, status = outcome.solver["name"], outcome.solver["status"]
-            complain(f"error: {outcome.case}: {name} did not converge: {status}; the results say so too")
-    from thermal.case.validation import NO_WINDOWS
-
-    if blind := [outcome.case for outcome in outcomes if outcome.has_windows is False]:
-        told = NO_WINDOWS.replace("the building has", f"{len(blind)} of {len(outcomes)} buildings have", 1)
-        complain(f"warning: {', '.join(blind)}: {told}")
-    content = {"cases": {outcome.case: outcome.to_dict() for outcome in outcomes}}
-    answer(json, content, lambda: _show_outcomes(what, outcomes, settings["horizon"], out))
-    if all(outcome.status in ("calibrated", "diagnosed") for outcome in outcomes):
-        return 0
-    return 2 if all(outcome.bad_input for outcome in outcomes) else 1
-
-
-def _show_outcomes(what: str, outcomes: Sequence[CaseOutcome], horizon: str, out: Path) -> None:
-    rows: list[tuple[Any, ...]] = []
-    for o in outcomes:
-        remarks = (", done before" if o.resumed else "") + (", no windows" if o.has_windows is False else "")
-        status = o.error or o.status.replace("_", " ") + remarks
-        found = () if what == "calibrate" else ((o.verdict or "").replace("_", " "), ", ".join(o.effects))
-        rows.append((o.case, o.held_out_mae_before, o.held_out_mae_after, *found, o.seconds, status))
-    errors = {"before [K]": ".3f", "after [K]": ".3f"}
-    columns = {"case": "", **errors, "time [s]": ".1f", "status": ""}
-    if what == "diagnose":
-        errors = {"calibrated [K]": ".3f", "handed on [K]": ".3f"}
-        columns = {"case": "", **errors, "verdict": "", "effects": "", "time [s]": ".1f", "status": ""}
-    show_table(f"Held-out error {horizon} ahead", columns, rows, more="summary.json lists them all")
-    if what == "diagnose":
-        named = Counter(effect for o in outcomes if o.verdict in ("named", "group") for effect in o.effects)
-        show_table("Found", {"effect": "", "cases": ".0f"}, named.most_common())
-    say(f"Results: {out}")
-
-
 def diagnose(
-    case: Annotated[Path, typer.Argument(metavar="CASE", help="Case folder, or a folder of case folders.")],
+    case: many.Cases,
     out: Annotated[
-        Path,
+        str,
         options.folder(
             "diagnosis.json, calibration.json of the model with the effects found, missing_watts.parquet, "
             "predictions.parquet, report.html; of a folder of cases one such folder a case, and summary.json"
@@ -265,8 +172,10 @@ def diagnose(
         ),
     ] = None,
     horizon: options.Horizon = "6h",
-    workers: Workers = None,
-    scheduler: Scheduler = None,
+    workers: many.Workers = None,
+    scheduler: many.Scheduler = None,
+    retries: many.Retries = 2,
+    limit: many.Limit = None,
     force: options.Force = False,
     json: options.Json = False,
 ) -> int:
@@ -279,17 +188,20 @@ def diagnose(
     from mpc.reports.diagnosis import diagnosis_summary
 
     settings = {"dx": dx, "horizon": horizon, "known": options.ids(effects), "ruled_out": options.ids(rule_out)}
-    if cases := _cases_in(case, out, workers, scheduler):
-        CalibrationError.unless(experiment is None, "--experiment", "one case", f"a folder of {len(cases)}")
-        settings |= {"tune": tune or [], "hold_out": hold_out or []}
-        return _many("diagnose", cases, out, settings, workers, scheduler, force, json)
-    with Waiting(f"diagnose {case.name}") as progress:
+    how = many.How(workers, scheduler, retries, limit, force, json)
+    if experiment is None:
+        both = {"tune": tune or [], "hold_out": hold_out or []}
+        if (code := many.of_folder("diagnose", case, out, settings | both, how)) is not None:
+            return code
+    else:
+        CalibrationError.unless(not many.is_folder(case, out), "--experiment", "one case", "a folder of them")
+    with Waiting(f"diagnose {Path(case).name}") as progress:
         if experiment is not None:
             own = not tune and not hold_out
             CalibrationError.unless(own, "--experiment", "no other intervals", "--tune or --hold-out")
-            result, report = _after_experiment(case, out, force, progress, experiment, settings)
+            result, report = _after_experiment(Path(case), Path(out), force, progress, experiment, settings)
         else:
-            result, report = run_diagnosis(case, out, force, progress, (tune or (), hold_out or ()), settings)
+            result, report = run_diagnosis(Path(case), Path(out), force, progress, (tune or (), hold_out or ()), settings)
     return answer(json, diagnosis_summary(result), lambda: _show_diagnosis(result), report)
 
 

@@ -10,12 +10,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from calibration.results import Content, write_results
 from mpc.kpi.kpis import Kpis
 from mpc.reports.assumptions import assumption_rows
 from mpc.reports.figures.control import cost_bars, course, expectations, side_by_side
 from mpc.reports.figures.style import CELSIUS
 from mpc.reports.means import NOTICED, comparison_means, control_means
-from mpc.reports.page import duration, percent, significant, spell, write_report
+from mpc.reports.page import duration, percent, render, significant, spell, write_report
 from mpc.studies.described import RecordedPlant
 from mpc.studies.run import Comparison, ControlRun, prediction_errors
 from thermal.case.points import POINT_TYPES, split_column
@@ -83,6 +84,23 @@ def write_comparison(comparison: Comparison, out: str | Path, *, command: str = 
     ResultsExistError
         When the folder holds something and ``force`` is not set.
     """
+    return write_results(out, _comparison_files(comparison, command), force) / "report.html"
+
+
+def comparison_files(comparison: Comparison, case: object) -> dict[str, Content]:
+    """Files of one of many comparisons.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        Of `compare_controllers`.
+    case : object
+        On which it was made.
+    """
+    return _comparison_files(comparison, "")
+
+
+def _comparison_files(comparison: Comparison, command: str) -> dict[str, Content]:
     runs = comparison.runs
     content = _content(runs, comparison.of("mpc") or runs[0], command) | {
         "title": f"Controllers of {comparison.study.name} compared",
@@ -95,7 +113,7 @@ def write_comparison(comparison: Comparison, out: str | Path, *, command: str = 
     }
     files: dict[str, Any] = {"comparison.json": comparison_summary(comparison)}
     files |= {f"trajectory_{run.controller}.parquet": trajectory(run) for run in runs}
-    return write_report(out, "control", content, files, force)
+    return {**files, "report.html": render("control", content)}
 
 
 def _content(runs: Sequence[ControlRun], shown: ControlRun, command: str) -> dict[str, Any]:

@@ -109,7 +109,8 @@ def test_a_run_that_is_killed_or_interrupted_goes_on(cases: Path, tmp_path: Path
     assert f"interrupted: what is finished is in {out}" in stderr and "Traceback" not in stderr
     assert not any(map(is_alive, workers))
     kept = sorted(p.name for p in out.iterdir())
-    assert kept[-1] == "summary.json" and 2 <= len(kept) <= len(NAMES)
+    assert kept[-2:] == ["summary.json", "tables"] and 3 <= len(kept) <= len(NAMES) + 1
+    kept.remove("tables")
     summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))["cases"]
     assert [name for name, entry in summary.items() if entry["status"] == "calibrated"] == kept[:-1]
     assert {entry["status"] for name, entry in summary.items() if name not in kept} == {"interrupted"}
@@ -121,7 +122,7 @@ def test_a_run_that_is_killed_or_interrupted_goes_on(cases: Path, tmp_path: Path
     assert entries == json.loads((out / "summary.json").read_text(encoding="utf-8"))["cases"]
     assert [name for name, entry in entries.items() if entry["resumed"]] == kept[:-1]
     assert {entry["status"] for entry in entries.values()} == {"calibrated"}
-    assert sorted(p.name for p in out.iterdir()) == [*NAMES, "summary.json"]
+    assert sorted(p.name for p in out.iterdir()) == [*NAMES, "summary.json", "tables"]
 
     answer = run("calibrate", cases, "--out", out, *OPTIONS)
     assert answer.exit_code == 0

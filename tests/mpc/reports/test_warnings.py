@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import calibration.fleet.run
-from calibration.fleet.case import CaseOutcome
+from calibration.fleet.outcome import CaseOutcome
 from mpc.cli import calibrate as _calibrate
 from mpc.reports.means import Means
 from mpc.reports.page import render
