@@ -23,8 +23,6 @@ class Told:
     ----------
     names : tuple of str
         Of the estimated parameters of the baseline; effects are no property of a population of buildings.
-    bases : tuple of str
-        Names that members of a group, one parameter of several facades or zones, have in common.
     point : ndarray, shape (p,)
         Estimate less the start of the drawing, on the estimation scale [-].
     covariance : ndarray, shape (p, p)
@@ -35,15 +33,17 @@ class Told:
         ``I u`` less the gradient of the data's cost at the estimate u [-].
     own_deviation : ndarray, shape (p,)
         Spread of a group's members about what they have in common [-]; 0 for a parameter of the whole building.
+    prior_deviation : ndarray, shape (p,)
+        Of the physical range [-].
     """
 
     names: tuple[str, ...]
-    bases: tuple[str, ...]
     point: FloatArray
     covariance: FloatArray
     information: FloatArray
     pull: FloatArray
     own_deviation: FloatArray
+    prior_deviation: FloatArray
 
     def rows(self) -> dict[str, dict[str, Any]]:
         """Columns of the table ``parameters`` by parameter; a list is its row of the matrix, in the order of names."""
@@ -51,6 +51,7 @@ class Told:
             name: {
                 "point": float(self.point[i]),
                 "own_deviation": float(self.own_deviation[i]),
+                "prior_deviation": float(self.prior_deviation[i]),
                 "pull": float(self.pull[i]),
                 "covariance": self.covariance[i].tolist(),
                 "information": self.information[i].tolist(),
@@ -77,6 +78,7 @@ def told_by(found: Estimate) -> Told:
     information = slopes.T @ slopes
     own = [problem.shrinkage.get(p.base, SHRINKAGE) if p.grouped else 0.0 for p in parameters]
     return Told(
-        tuple(p.name for p in parameters), tuple(p.base for p in parameters), point,
+        tuple(p.name for p in parameters), point,
         found.covariance[np.ix_(chosen, chosen)], information, information @ point - slopes.T @ data, np.array(own),
+        np.array([p.prior_deviation for p in parameters]),
     )  # fmt: skip

@@ -63,6 +63,9 @@ class CaseTask(Task):
         with self._starts.open("a", encoding="utf-8") as stream:
             stream.write(f"{line}\n")
 
+    def survived(self) -> None:
+        """Keep the marks: they go with the run."""
+
     def finished(self) -> CaseOutcome | None:
         """Find results of this run."""
         there = read_record(self.out)

@@ -47,6 +47,8 @@ def outcomes_of(
                 answer = _answer(future, task, isinstance(pool, ClusterExecutor))
                 if isinstance(answer, Task):
                     handed.again.append(answer)
+                    if answer is task and isinstance(pool, ClusterExecutor):
+                        pool.look_now()
                 else:
                     yield answer
         for task in handed.left():
@@ -76,6 +78,8 @@ class _Handed:
             if self.pool.connection != self._connection:  # what the lost one was to answer never comes
                 self._connection = self.pool.connection
                 self.again.extend(self.pending.values())
+                for future in self.pending:
+                    future.cancel()
                 self.pending.clear()
             if self.trouble is None and not self.pool.ready:
                 time.sleep(TICK / 10.0)

@@ -18,12 +18,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import groupby
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
 
 from calibration.errors import CalibrationError
 from calibration.evaluation.population import Population
+from calibration.fleet.data_set import Folder, read_table
 from thermal._types import FloatArray
 
 #: Buildings that the physical ranges count as in T [-]: as one building more than none, so that T is never singular.
@@ -142,3 +145,26 @@ def learn_population(members: Sequence[Member], ranges: Mapping[str, float]) -> 
             break
     unknown = covariance / max(1.0, weights.sum())  # of m
     return Population(names, mean, covariance + unknown, tuple(m.case for m in members), weights)
+
+
+def population_of(folder: Folder) -> Population:
+    """Learn the population of a fleet from the data set of its calibrations.
+
+    Parameters
+    ----------
+    folder : Folder
+        Of the results, see `calibration.fleet.data_set`; read part by part.
+
+    Raises
+    ------
+    CalibrationError
+        When there are fewer than two buildings with estimated parameters.
+    """
+    members, ranges = list[Member](), dict[str, float]()
+    for part in read_table(folder, "parameters"):
+        for case, rows in groupby(part.to_pylist(), key=itemgetter("case")):
+            listed = list(rows)
+            if (made := member(str(case), listed)) is not None:
+                members.append(made)
+                ranges |= {r["base"]: r["prior_deviation"] for r in listed if r["information"] is not None}
+    return learn_population(members, ranges)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import tempfile
 import time
 import uuid
@@ -17,7 +18,7 @@ from typing import Any
 
 from calibration.errors import CalibrationError, ResultsExistError
 from calibration.fleet.data_set import TABLES, write_data_set
-from calibration.fleet.job import Job
+from calibration.fleet.job import Job, Status
 from calibration.fleet.loop import outcomes_of
 from calibration.fleet.outcome import RECORD, CaseOutcome, key_of, outcome_of, parse_record
 from calibration.fleet.settings import Settings
@@ -31,6 +32,10 @@ FLEET = "fleet.json"
 
 #: Folder of the results that holds which workers began the cases that are not finished.
 _BEGUN = ".begun"
+
+#: Folder of this machine that a case is copied to, and where its name stands in an error.
+_PREFIX = "buildingmpc-case-"
+_COPY = re.compile(rf"[^\s'\":]*{_PREFIX}\w+[/\\]")
 
 #: Stage of the progress.
 _STAGE = "cases"
@@ -98,11 +103,25 @@ class RemoteTask(Task):
         }
         return replace(found, resumed=True) if key_of(here) == key_of(record) else None
 
+    def unfinished(self, status: Status, error: Exception | None = None) -> CaseOutcome:
+        """Describe an end without results, in the words that any worker would find.
+
+        Parameters
+        ----------
+        status : str
+            One of `Status`.
+        error : Exception, optional
+            What went wrong.
+        """
+        found = super().unfinished(status, error)
+        told = None if found.message is None else _COPY.sub(f"{self.cases}/", found.message)
+        return replace(found, message=told)
+
     @contextmanager
     def opened(self) -> Iterator[tuple[Path, str]]:
         """Copy the case to this machine."""
         store = Store(self.cases).at(self.case)
-        with tempfile.TemporaryDirectory(prefix="buildingmpc-") as made:
+        with tempfile.TemporaryDirectory(prefix=_PREFIX) as made:
             folder = Path(made) / self.case
             files = store.digest()
             store.fetch(folder)
@@ -146,7 +165,7 @@ class FleetOutcome:
     seconds: float = 0.0
 
     def to_dict(self) -> dict[str, Any]:
-        """Counts, and the cases without results by name."""
+        """Contents of ``summary.json``: counts, and the cases without results by name."""
         troubled = {o.case: {"status": o.status, "error": o.error, "message": o.message} for o in self.troubled}
         return {"counts": dict(self.counts), "resumed": self.resumed, "troubled": troubled, "seconds": self.seconds}
 

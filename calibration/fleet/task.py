@@ -76,6 +76,7 @@ class Task(ABC):
     def mark(self, line: str) -> None:
         """Write down that a worker begins the case."""
 
+    @abstractmethod
     def survived(self) -> None:
         """Write down that the case ended without results and without ending its worker."""
 

@@ -197,11 +197,12 @@ def diagnose(
         CalibrationError.unless(not many.is_folder(case, out), "--experiment", "one case", "a folder of them")
     with Waiting(f"diagnose {Path(case).name}") as progress:
         if experiment is not None:
-            own = not tune and not hold_out
-            CalibrationError.unless(own, "--experiment", "no other intervals", "--tune or --hold-out")
+            free = not tune and not hold_out
+            CalibrationError.unless(free, "--experiment", "no other intervals", "--tune or --hold-out")
             result, report = _after_experiment(Path(case), Path(out), force, progress, experiment, settings)
         else:
-            result, report = run_diagnosis(Path(case), Path(out), force, progress, (tune or (), hold_out or ()), settings)
+            own = (tune or (), hold_out or ())
+            result, report = run_diagnosis(Path(case), Path(out), force, progress, own, settings)
     return answer(json, diagnosis_summary(result), lambda: _show_diagnosis(result), report)
 
 

@@ -15,7 +15,7 @@ from mpc.cli.console import Waiting, answer, say, show_table
 def identify(
     plant: Annotated[
         str,
-        typer.Argument(metavar="PLANT", help="plant.yaml, name of a ready plant, or a folder of folders with one each."),
+        typer.Argument(metavar="PLANT", help="plant.yaml, name of a ready plant, or a folder of such folders."),
     ],
     out: Annotated[str, options.folder("model.json, identify.json, telemetry.parquet, report.html")],
     days: Annotated[int, options.value("Length of the experiment [d].", "DAYS")] = 14,
