@@ -151,7 +151,7 @@ class Chaos(Thread):
 
 
 def attempts(entries: list[Entry], gone: dict[int, float]) -> Iterator[tuple[int, str, float, bool]]:
-    """Attempts at cases in order: process, case, how long [s], and whether the results were the case's first."""
+    """List attempts at cases in order: process, case, how long [s], and whether the results were the case's first."""
     begun: dict[int, Entry] = {}
     finished: set[str] = set()
     for e in sorted(entries, key=lambda e: e.time):

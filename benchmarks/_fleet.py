@@ -2,8 +2,8 @@
 
 True parameters are normal about a centre that is not the drawing's, on the estimation scale: the centre lies 0.8 of a
 prior's deviations from the start, in a direction that is drawn once for all, and buildings spread about it by 0.25 of
-one. So buildings of one builder and age may be: alike, and not as the handbook has them. Unmeasured heat and sensors are
-those of `TwinRanges`, drawn for each building.
+one. So buildings of one builder and age may be: alike, and not as the handbook has them. Unmeasured heat and sensors
+are those of `TwinRanges`, drawn for each building.
 """
 
 from __future__ import annotations

@@ -37,6 +37,7 @@ from _table import markdown, write
 from calibration.fleet.cluster import ClusterExecutor
 from calibration.fleet.data_set import TABLES
 from calibration.fleet.diagnose import diagnosis_job
+from calibration.fleet.handling import Handling
 from calibration.fleet.job import Job, calibration_job
 from calibration.fleet.remote import do_fleet
 from calibration.fleet.store import Store
@@ -63,7 +64,7 @@ def undisturbed(cases: Path, out: Path) -> dict[str, Any]:
     """Calibrate and diagnose with local processes."""
     lost, cpu = 0, child_seconds()
     for name, job in jobs().items():
-        found = do_fleet(job, f"file://{cases}", f"file://{out / name}", SETTINGS[name], WORKERS)
+        found = do_fleet(job, f"file://{cases}", f"file://{out / name}", SETTINGS[name], Handling(WORKERS))
         lost += len(found.troubled)
     return {"lost": lost, "cpu": child_seconds() - cpu} | peak_memory(out)
 
@@ -83,7 +84,7 @@ def disturbed(cases: Path, out: Path, kills: int, seed: int) -> dict[str, Any]:
         with chaos(cluster, log, at, [there + rng.randrange(max(1, count - there))], seed) as thread:
             with ClusterExecutor(cluster.address, timeout=120.0, patience=300.0) as executor:
                 urls = f"file://{cases}", f"faulty://{out / name}"
-                found = do_fleet(job, *urls, SETTINGS[name], executor, retries=RETRIES)
+                found = do_fleet(job, *urls, SETTINGS[name], Handling(executor, RETRIES))
         lost += len(found.troubled)
         books.append((read_log(log), thread))
     return {"lost": lost} | peak_memory(out) | summed(books)

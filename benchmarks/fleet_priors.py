@@ -71,7 +71,7 @@ def train(folder: Path, count: int) -> tuple[Population, int]:
 
 
 def true_population(learned: Population, prior: dict[str, float]) -> Population:
-    """What an endless fleet would teach."""
+    """Make the population that an endless fleet would teach."""
     deviation = np.array([prior[name] for name in learned.names])
     centre = population_centre(list(learned.names))
     mean = np.array([centre[name] for name in learned.names]) * deviation

@@ -171,7 +171,7 @@ def _add(tables: dict[str, list[dict[str, Any]]], outcome: CaseOutcome, folder: 
         record = parse_record(folder.read(f"{outcome.case}/{RECORD}")) or {}
     except FileNotFoundError:
         record = {}
-    told: Mapping[str, Any] = record.get("outcome") or asdict(outcome)
+    told: dict[str, Any] = record.get("outcome") or asdict(outcome)
     name = {"case": outcome.case}
     tables["cases"].append(told | name | {"key": key_of(record) if record else None})
     tables["runs"].append(
@@ -180,7 +180,7 @@ def _add(tables: dict[str, list[dict[str, Any]]], outcome: CaseOutcome, folder: 
         | {"run": record.get("run"), "version": record.get("version")}
     )
     for table, rows in record.get("tables", {}).items():
-        tables.setdefault(table, []).extend(name | row for row in rows)
+        tables.setdefault(table, []).extend({**name, **row} for row in rows)
 
 
 def _parquet(rows: Sequence[Mapping[str, Any]], schema: pa.Schema | None) -> bytes:

@@ -8,6 +8,7 @@ from typing import Any
 from calibration.diagnosis.diagnosis import Diagnosis, diagnose
 from calibration.diagnosis.known import reasons_of
 from calibration.errors import CalibrationError
+from calibration.fleet.handling import Handling
 from calibration.fleet.job import Done, Files, Job
 from calibration.fleet.outcome import CaseOutcome
 from calibration.fleet.run import do_many
@@ -45,7 +46,6 @@ def diagnose_many(
     retries: int = 2,
     force: bool = False,
     progress: Progress | None = None,
-    limit: float | None = None,
 ) -> tuple[CaseOutcome, ...]:
     """Diagnose many cases side by side; what is finished is never lost, as in `calibration.fleet.run.calibrate_many`.
 
@@ -60,8 +60,8 @@ def diagnose_many(
     files : callable
         Makes the files of a case's results: their data alone by default, `mpc.reports.diagnosis.diagnosis_files` with
         tables and a page to read.
-    workers, retries, force, progress, limit
-        As in `calibrate_many`; the limit in seconds [s].
+    workers, retries, force, progress
+        As in `calibrate_many`.
 
     Returns
     -------
@@ -76,7 +76,7 @@ def diagnose_many(
         When an effect is not in the catalogue.
     """
     job = diagnosis_job(files)
-    return do_many(job, cases, out, settings or {}, workers, retries, force, progress, limit)
+    return do_many(job, cases, out, settings or {}, Handling(workers, retries, force), progress)
 
 
 def diagnosis_job(files: Files = diagnosis_data) -> Job:

@@ -9,7 +9,6 @@ import time
 import uuid
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from concurrent.futures import Executor
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
@@ -18,6 +17,7 @@ from typing import Any
 
 from calibration.errors import CalibrationError, ResultsExistError
 from calibration.fleet.data_set import TABLES, write_data_set
+from calibration.fleet.handling import Handling
 from calibration.fleet.job import Job, Status
 from calibration.fleet.loop import outcomes_of
 from calibration.fleet.outcome import RECORD, CaseOutcome, key_of, outcome_of, parse_record
@@ -175,11 +175,7 @@ def do_fleet(
     cases: str,
     out: str,
     settings: Settings,
-    workers: Executor | int | None = None,
-    *,
-    retries: int = 2,
-    force: bool = False,
-    limit: float | None = None,
+    how: Handling,
     progress: Progress | None = None,
 ) -> FleetOutcome:
     """Do a job with every folder at a URL; what is finished is never lost, and not done again.
@@ -196,14 +192,8 @@ def do_fleet(
         URLs of the folder of cases, and of that of the results, see `calibration.fleet.store.Store`.
     settings : CalibrationSettings, or mapping of str to Any
         Of the job.
-    workers : Executor or int, optional
-        As in `calibration.calibrate_many`.
-    retries : int
-        How often a case is given to another worker after its own died [-].
-    force : bool
-        Do anew what has results, or was set aside.
-    limit : float, optional
-        Longest time that a case may take a worker, which is ended then [s]; none by default.
+    how : Handling
+        By whom, how often, for how long.
     progress : callable, optional
         Called with stage, done, total after each case.
 
@@ -212,27 +202,25 @@ def do_fleet(
     CalibrationError
         When there are no cases, or results would land among them.
     ResultsExistError
-        When there are results with other settings or of another version, and `force` is not set.
+        When there are results with other settings or of another version, and `Handling.force` is not set.
     """
     began = time.perf_counter()
-    for name, value, least in (("retries", retries, 0), ("workers", workers, 1)):
-        CalibrationError.unless(not isinstance(value, int) or value >= least, name, f"at least {least}", value)
     source, target, spelled = Store(cases), Store(out), job.spell(settings)
     inside = (target.url + "/").startswith(source.url + "/") or (source.url + "/").startswith(target.url + "/")
     CalibrationError.unless(not inside, str(out), "results beside the cases, not among them", cases)
-    _check_made_with(target, spelled, force)
+    _check_made_with(target, spelled, how.force)
     count = sum(1 for name in source.folders() if name != TABLES)
     CalibrationError.unless(count > 0, cases, "at least one folder", "none")
     run = uuid.uuid4().hex[:12]
     names = (name for name in source.folders() if name != TABLES)
     tasks = (
         RemoteTask(
-            cases=source.url, out=target.url, case=name, settings=settings, run=run, attempt=0, retries=retries,
-            force=force, job=job, limit=limit,
+            cases=source.url, out=target.url, case=name, settings=settings, run=run, attempt=0,
+            retries=how.retries, force=how.force, job=job, limit=how.limit,
         )
         for name in names
     )  # fmt: skip
-    if force:
+    if how.force:
         target.remove(_BEGUN)
     counts: Counter[str] = Counter()
     troubled: dict[str, CaseOutcome] = {}
@@ -240,7 +228,7 @@ def do_fleet(
     tell = progress or (lambda stage, done, total: None)
     try:
         tell(_STAGE, 0, count)
-        with closing(outcomes_of(tasks, count, workers)) as coming:
+        with closing(outcomes_of(tasks, count, how.workers)) as coming:
             for outcome in coming:
                 counts[outcome.status] += 1
                 resumed += outcome.resumed

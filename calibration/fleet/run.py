@@ -15,6 +15,7 @@ from typing import Any
 from calibration.errors import CalibrationError, ResultsExistError
 from calibration.fleet.case import CaseTask, earlier_outcome
 from calibration.fleet.data_set import TABLES, LocalFolder, write_data_set
+from calibration.fleet.handling import Handling
 from calibration.fleet.job import Files, Job, calibration_job, data_files
 from calibration.fleet.loop import outcomes_of
 from calibration.fleet.outcome import RECORD, CaseOutcome
@@ -57,7 +58,6 @@ def calibrate_many(
     retries: int = 2,
     force: bool = False,
     progress: Progress | None = None,
-    limit: float | None = None,
 ) -> tuple[CaseOutcome, ...]:
     """Calibrate many cases side by side, each in a worker, which writes its results when it is done.
 
@@ -90,8 +90,6 @@ def calibrate_many(
         Calibrate anew what has results; they are replaced one by one.
     progress : callable, optional
         Called with stage, done, total after each case.
-    limit : float, optional
-        Longest time that a case may take a worker, which is ended then [s]; none by default.
 
     Returns
     -------
@@ -116,7 +114,7 @@ def calibrate_many(
     []
     """
     job = calibration_job(files)
-    return do_many(job, cases, out, settings or {}, workers, retries, force, progress, limit)
+    return do_many(job, cases, out, settings or {}, Handling(workers, retries, force), progress)
 
 
 def do_many(
@@ -124,11 +122,8 @@ def do_many(
     cases: Sequence[str | Path],
     out: str | Path,
     settings: Settings,
-    workers: Executor | int | None = None,
-    retries: int = 2,
-    force: bool = False,
+    how: Handling,
     progress: Progress | None = None,
-    limit: float | None = None,
 ) -> tuple[CaseOutcome, ...]:
     """Do a job with many cases, as `calibrate_many` calibrates them.
 
@@ -136,34 +131,34 @@ def do_many(
     ----------
     job : Job
         What is done.
-    cases, out, workers, retries, force, progress, limit
-        As in `calibrate_many`; the limit in seconds [s].
+    cases, out, progress
+        As in `calibrate_many`.
     settings : CalibrationSettings, or mapping of str to Any
         Of the job.
+    how : Handling
+        By whom, how often, for how long.
     """
     began = time.perf_counter()
     spelled = job.spell(settings)
-    for name, value, least in (("retries", retries, 0), ("workers", workers, 1)):
-        CalibrationError.unless(not isinstance(value, int) or value >= least, name, f"at least {least}", value)
     folder = _absolute(check_results_folder(out, force=True))
     paths = _check_cases(cases, folder)
-    if not force:
+    if not how.force:
         _refuse_other_contents(folder)
     with _claimed(folder) as running:
         tasks = [
             CaseTask(
                 case=path, out=folder / path.name, running=running, settings=settings, run=running.name, attempt=0,
-                retries=retries, force=force, job=job, limit=limit,
+                retries=how.retries, force=how.force, job=job, limit=how.limit,
             )
             for path in paths
         ]  # fmt: skip
-        there = {} if force else {t.name: earlier_outcome(t.case, t.out, spelled) for t in tasks}
+        there = {} if how.force else {t.name: earlier_outcome(t.case, t.out, spelled) for t in tasks}
         found = {name: outcome for name, outcome in there.items() if outcome is not None}
         todo = [task for task in tasks if task.name not in found]
         tell = progress or (lambda stage, done, total: None)
         try:
             tell(STAGE, len(found), len(tasks))
-            with closing(outcomes_of(todo, len(todo), workers)) as coming:
+            with closing(outcomes_of(todo, len(todo), how.workers)) as coming:
                 for outcome in coming:
                     found[outcome.case] = outcome
                     tell(STAGE, len(found), len(tasks))

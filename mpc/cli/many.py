@@ -20,6 +20,7 @@ from mpc.cli.console import Waiting, answer, complain, say, show_table
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
+    from calibration.fleet.handling import Handling
     from calibration.fleet.job import Job
     from calibration.fleet.outcome import CaseOutcome
     from calibration.fleet.remote import FleetOutcome
@@ -78,6 +79,12 @@ class How:
             raise CalibrationError("--limit", "a time such as 30min", repr(self.limit)) from error
         CalibrationError.unless(seconds > 0.0, "--limit", "a positive time", self.limit)
         return seconds
+
+    def handling(self, executor: Executor | None) -> Handling:
+        """Say it as the library takes it."""
+        from calibration.fleet.handling import Handling
+
+        return Handling(executor or self.workers, self.retries, self.force, self.seconds)
 
     def executor(self, *folders: Path) -> AbstractContextManager[Executor | None]:
         """Connect to the cluster, if there is one."""
@@ -184,8 +191,8 @@ def _here(what: str, job: Job, folder: Path, out: Path, settings: dict[str, Any]
     try:
         with Waiting(f"{what} cases") as waiting, how.executor(cases[0].parent) as executor:
             outcomes = do_many(
-                job, cases, out, settings, executor or how.workers, how.retries, how.force,
-                lambda _, done, total: waiting(f"{done} of {total}", done, total), how.seconds,
+                job, cases, out, settings, how.handling(executor),
+                lambda _, done, total: waiting(f"{done} of {total}", done, total),
             )  # fmt: skip
     except KeyboardInterrupt:
         _say_goes_on(str(out))
@@ -215,9 +222,8 @@ def _at_url(what: str, job: Job, cases: str, out: str, settings: dict[str, Any],
     try:
         with Waiting(f"{what} cases") as waiting, how.executor() as executor:
             found = do_fleet(
-                job, as_url(cases), as_url(out), settings, executor or how.workers, retries=how.retries,
-                force=how.force, limit=how.seconds,
-                progress=lambda _, done, total: waiting(f"{done} of {total}", done, total),
+                job, as_url(cases), as_url(out), settings, how.handling(executor),
+                lambda _, done, total: waiting(f"{done} of {total}", done, total),
             )  # fmt: skip
     except KeyboardInterrupt:
         _say_goes_on(out)

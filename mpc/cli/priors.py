@@ -19,7 +19,7 @@ PRIORS = "priors.json"
 
 def priors(
     results: Annotated[
-        str, typer.Argument(metavar="RESULTS", help="Folder that `buildingmpc calibrate FOLDER` wrote: a path or a URL.")
+        str, typer.Argument(metavar="RESULTS", help="Folder that `buildingmpc calibrate FOLDER` wrote: path or URL.")
     ],
     out: Annotated[Path, options.folder(PRIORS)],
     force: options.Force = False,

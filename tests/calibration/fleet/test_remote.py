@@ -21,8 +21,8 @@ from fsspec.implementations.local import LocalFileSystem
 from calibration.errors import CalibrationError, ResultsExistError
 from calibration.fleet import data_set, store
 from calibration.fleet.data_set import LocalFolder
+from calibration.fleet.handling import Handling
 from calibration.fleet.job import Done, Job, calibration_job
-from calibration.fleet.local import LocalProcesses
 from calibration.fleet.priors import population_of
 from calibration.fleet.remote import RemoteTask, do_fleet
 from calibration.fleet.store import Store
@@ -73,7 +73,7 @@ def test_cases_on_s3(bucket: str, offices: Path, tmp_path: Path) -> None:
     """Done once, taken over afterwards, redone where a case changed; the tables are those of local files."""
     told: list[tuple[int, int]] = []
     with ThreadPoolExecutor(1) as pool:
-        run = lambda out, **more: do_fleet(JOB, f"{bucket}/cases", out, SETTINGS, pool, **more)  # noqa: E731
+        run = lambda out, **more: do_fleet(JOB, f"{bucket}/cases", out, SETTINGS, Handling(pool), **more)  # noqa: E731
         first = run(f"{bucket}/results", progress=lambda _, done, total: told.append((done, total)))
         assert (first.counts, first.resumed) == ({"failed": 1, "calibrated": 2}, 0)
         assert told == [(0, 3), (1, 3), (2, 3), (3, 3)]
@@ -92,9 +92,9 @@ def test_cases_on_s3(bucket: str, offices: Path, tmp_path: Path) -> None:
         changed = run(f"{bucket}/results")
         assert (changed.resumed, there.read("office 0/case.json") == stamps) == (1, False)
         with pytest.raises(ResultsExistError, match=r"results with another horizon; choose another --out, or --force"):
-            do_fleet(JOB, f"{bucket}/cases", f"{bucket}/results", SETTINGS | {"horizon": "2h"}, pool)
+            do_fleet(JOB, f"{bucket}/cases", f"{bucket}/results", SETTINGS | {"horizon": "2h"}, Handling(pool))
 
-        here = do_fleet(JOB, f"file://{offices}", f"file://{tmp_path / 'out'}", SETTINGS, pool)
+        here = do_fleet(JOB, f"file://{offices}", f"file://{tmp_path / 'out'}", SETTINGS, Handling(pool))
     assert here.counts == first.counts
     local = parts(LocalFolder(tmp_path / "out"))
     assert local.keys() == tables.keys()
@@ -110,7 +110,7 @@ def test_duckdb_reads_the_tables(offices: Path, tmp_path: Path, monkeypatch: pyt
     """The queries of the documentation, over tables of several parts."""
     monkeypatch.setattr(data_set, "PART", 2)
     with ThreadPoolExecutor(1) as pool:
-        do_fleet(JOB, f"file://{offices}", f"file://{tmp_path}/results", SETTINGS, pool)
+        do_fleet(JOB, f"file://{offices}", f"file://{tmp_path}/results", SETTINGS, Handling(pool))
     assert len(list((tmp_path / "results/tables/cases").iterdir())) == 2
     page = (Path(__file__).parents[3] / "docs" / "fleets.md").read_text(encoding="utf-8")
     queries = [q.split("```")[0] for q in page.split("```sql\n")[1:]]
@@ -194,12 +194,12 @@ def test_poisoned_cases_are_set_aside_by_name(tmp_path: Path) -> None:
         (tmp_path / "cases" / name / "x.yaml").write_text("", encoding="utf-8")
     job = Job(plain, stall, nothing, same, "x.yaml")
     urls = f"file://{tmp_path / 'cases'}", f"file://{tmp_path / 'out'}"
-    found = do_fleet(job, *urls, {}, 2, retries=0, limit=1.0)
+    found = do_fleet(job, *urls, {}, Handling(2, retries=0, limit=1.0))
     assert found.counts == {"calibrated": 1, "lost": 2}
     assert [(o.case, o.status, o.attempts) for o in found.troubled] == [("kills", "lost", 1), ("stalls", "lost", 1)]
     assert "SIGALRM" in str(found.troubled[1].message)
     with ThreadPoolExecutor(1) as pool:  # would be ended by them, this process
-        again = do_fleet(job, *urls, {}, pool, retries=0)
+        again = do_fleet(job, *urls, {}, Handling(pool, retries=0))
     assert again.counts == {"calibrated": 1, "lost": 2} and again.resumed == 1
     assert "its worker died 1 times" in str(again.troubled[0].message)
     rows = pq.read_table(tmp_path / "out" / "tables" / "cases").to_pylist()
@@ -268,11 +268,12 @@ def test_bad_places(offices: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPat
     with pytest.raises(CalibrationError, match="expected a URL that fsspec knows, got: Protocol not known"):
         Store("nonsense://x")
     with pytest.raises(CalibrationError, match="results beside the cases, not among them"):
-        do_fleet(JOB, f"file://{offices}", f"file://{offices}/results", SETTINGS)
+        do_fleet(JOB, f"file://{offices}", f"file://{offices}/results", SETTINGS, Handling())
     with pytest.raises(CalibrationError, match="at least one folder, found none"):
-        do_fleet(JOB, f"file://{tmp_path}/none", f"file://{tmp_path}/out", SETTINGS)
-    with LocalProcesses(1) as pool, pytest.raises(CalibrationError, match="retries: expected at least 0, found -1"):
-        do_fleet(JOB, f"file://{offices}", f"file://{tmp_path}/out", SETTINGS, pool, retries=-1)
+        do_fleet(JOB, f"file://{tmp_path}/none", f"file://{tmp_path}/out", SETTINGS, Handling())
+    for given, message in (({"retries": -1}, "retries: expected at least 0"), ({"limit": 0.0}, "limit: expected a positive")):
+        with pytest.raises(CalibrationError, match=message):
+            Handling(**given)
     monkeypatch.setitem(__import__("sys").modules, "fsspec.core", None)
     with pytest.raises(MissingExtraError, match=r'needs the extra: pip install "buildingmpc\[fleet\]"'):
         Store(f"file://{tmp_path}")
