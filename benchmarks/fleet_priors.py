@@ -124,8 +124,11 @@ def main() -> None:
     began, load = time.process_time(), os.getloadavg()[0]
     with tempfile.TemporaryDirectory() as folder:
         learned, failed = train(Path(folder) / "train", options.train)
-        seeds = range(FIRST_TEST, FIRST_TEST + options.test)
-        judged = [judge(Path(folder) / f"office_{seed}", seed, learned) for seed in seeds]
+        judged = []
+        for seed in range(FIRST_TEST, FIRST_TEST + options.test):
+            judged.append(judge(Path(folder) / f"office_{seed}", seed, learned))
+            print(f"{len(judged)} of {options.test}, {time.process_time() - began:.0f} s of CPU", flush=True)
+            print(markdown(COLUMNS, rows(judged)), flush=True)
     table = markdown(COLUMNS, rows(judged))
     note = (
         f"{options.train} buildings to learn from ({failed} without a converged calibration), {options.test} others to "

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from calibration.errors import CalibrationError
 from calibration.results import plain
@@ -48,7 +49,9 @@ class Population:
         content: dict[str, Any] = plain({"format": _FORMAT, **vars(self)})
         return content
 
-    def prior(self, parameters: Sequence[Parameter], own: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def prior(
+        self, parameters: Sequence[Parameter], own: FloatArray
+    ) -> tuple[NDArray[np.bool_], FloatArray, FloatArray]:
         """Put the population in the place of the physical ranges, where it knows a parameter.
 
         Parameters
@@ -66,9 +69,11 @@ class Population:
         """
         index = {name: i for i, name in enumerate(self.names)}
         of = np.array([-1 if p.effect is not None else index.get(p.base, -1) for p in parameters])
-        known, at = of >= 0, np.maximum(of, 0)
+        known: NDArray[np.bool_] = np.asarray(of >= 0)
+        at = np.maximum(of, 0)
         covariance = np.where(np.outer(known, known), self.covariance[np.ix_(at, at)], 0.0)
-        return known, np.where(known, self.mean[at], 0.0), covariance + np.diag(np.where(known, own**2, 0.0))
+        moved = np.where(known, self.mean[at], 0.0)
+        return known, moved, np.asarray(covariance + np.diag(np.where(known, own**2, 0.0)), dtype=float)
 
 
 def read_population(path: str | Path) -> Population:

@@ -4,7 +4,7 @@ Building b says of its parameters u (on the estimation scale, counted from its d
 information :math:`I_b` and pull :math:`h_b` does. With :math:`u \sim N(m, T)` the posterior of a building is
 :math:`S_b = (I_b + T^{-1})^{-1}`, :math:`e_b = S_b (h_b + T^{-1} m)`, and expectation maximisation repeats
 
-.. math:: m = \frac{\sum_b w_b e_b}{\sum_b w_b}, \qquad
+.. math:: m = \Big(T_0^{-1} + \sum_b w_b (1 + I_b T)^{-1} I_b\Big)^{-1} \sum_b w_b (1 + I_b T)^{-1} h_b, \qquad
    T = \frac{\nu T_0 + \sum_b w_b \left(S_b + (e_b - m)(e_b - m)^\top\right)}{\nu + \sum_b w_b}
 
 (Dempster, Laird and Rubin 1977, doi:10.1111/j.2517-6161.1977.tb01600.x; Gelman et al. 2013, Bayesian Data Analysis,
@@ -35,8 +35,8 @@ RANGE_BUILDINGS = 1.0
 #: Degrees of freedom κ of the weights [-]: Lange, Little and Taylor estimate 2 to 10 on data with outliers.
 TAILS = 5.0
 
-#: Most rounds, and the change of m in its deviations that ends them [-].
-_ROUNDS, _STILL = 500, 1e-4
+#: Most rounds, and the relative change of variances that ends them [-].
+_ROUNDS, _STILL = 3000, 1e-4
 
 #: Share of the largest information below which a direction counts as untold [-].
 _SMALL = 1e-10
@@ -127,23 +127,23 @@ def learn_population(members: Sequence[Member], ranges: Mapping[str, float]) -> 
     ranged = np.diag(spread**2)
     mean, covariance, weights = np.zeros(size), ranged, np.ones(count)
     for _ in range(_ROUNDS):
-        precision = np.linalg.inv(covariance)
-        open_ = np.linalg.inv(information + precision)
-        found = np.einsum("bij,bj->bi", open_, pull + precision @ mean)
-        # what the data say of the distance to the mean: the pull's is N(I m, I + I T I)
+        # what the data say of the mean: of information K = (1 + I T)^-1 I, buildings' own deviations integrated out
+        out = np.linalg.inv(np.eye(size) + information @ covariance)
         apart = pull - information @ mean
         around = information + information @ covariance @ information
         distance = np.einsum("bi,bij,bj->b", apart, np.linalg.pinv(around, _SMALL, hermitian=True), apart)
-        weights = (TAILS + told) / (TAILS + np.maximum(distance, 0.0))
-        weights = np.minimum(weights, 1.0)  # one that is nearer than it should be says no more than the others
-        new = np.average(found, axis=0, weights=weights)
-        off = found - new
+        weights = np.minimum((TAILS + told) / (TAILS + np.maximum(distance, 0.0)), 1.0)  # nearer says no more
+        total = np.einsum("b,bij->ij", weights, out @ information) + np.linalg.inv(ranged)
+        mean = np.linalg.solve(total, np.einsum("b,bij,bj->i", weights, out, pull))
+        precision = np.linalg.inv(covariance)
+        open_ = np.linalg.inv(information + precision)
+        off = np.einsum("bij,bj->bi", open_, pull + precision @ mean) - mean
         seen = np.einsum("b,bij->ij", weights, open_) + np.einsum("b,bi,bj->ij", weights, off, off)
-        covariance = (RANGE_BUILDINGS * ranged + seen) / (RANGE_BUILDINGS + weights.sum())
-        moved, mean = np.abs(new - mean) / np.sqrt(np.diag(covariance)), new
-        if moved.max() < _STILL:
+        new = (RANGE_BUILDINGS * ranged + seen) / (RANGE_BUILDINGS + weights.sum())
+        moved, covariance = np.abs(np.diag(new) / np.diag(covariance) - 1.0).max(), new
+        if moved < _STILL:
             break
-    unknown = covariance / max(1.0, weights.sum())  # of m
+    unknown = np.linalg.inv(total)  # of the mean
     return Population(names, mean, covariance + unknown, tuple(m.case for m in members), weights)
 
 

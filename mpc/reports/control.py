@@ -84,11 +84,11 @@ def write_comparison(comparison: Comparison, out: str | Path, *, command: str = 
     ResultsExistError
         When the folder holds something and ``force`` is not set.
     """
-    return write_results(out, _comparison_files(comparison, command), force) / "report.html"
+    return write_results(out, comparison_files(comparison, comparison.study, command), force) / "report.html"
 
 
-def comparison_files(comparison: Comparison, case: object) -> dict[str, Content]:
-    """Files of one of many comparisons.
+def comparison_files(comparison: Comparison, case: object, command: str = "") -> dict[str, Content]:
+    """Make the files of a comparison.
 
     Parameters
     ----------
@@ -96,11 +96,9 @@ def comparison_files(comparison: Comparison, case: object) -> dict[str, Content]
         Of `compare_controllers`.
     case : object
         On which it was made.
+    command : str
+        That led to it, for the page.
     """
-    return _comparison_files(comparison, "")
-
-
-def _comparison_files(comparison: Comparison, command: str) -> dict[str, Content]:
     runs = comparison.runs
     content = _content(runs, comparison.of("mpc") or runs[0], command) | {
         "title": f"Controllers of {comparison.study.name} compared",

@@ -59,9 +59,10 @@ def test_exact_buildings_give_their_own_mean_and_spread() -> None:
     w = found.weights
     mean = np.average(points, axis=0, weights=w)
     seen = np.einsum("b,bi,bj->ij", w, points - mean, points - mean)
-    expected = (0.49 * np.eye(3) + seen) / (1.0 + w.sum()) * (1.0 + 1.0 / w.sum())
-    np.testing.assert_allclose(found.mean, mean, atol=1e-4)
-    np.testing.assert_allclose(found.covariance, expected, rtol=1e-3, atol=1e-5)
+    spread = (0.49 * np.eye(3) + seen) / (1.0 + w.sum())
+    np.testing.assert_allclose(found.mean, mean, atol=5e-3)  # the ranges know a little of the mean too
+    unknown = np.linalg.inv(w.sum() * np.linalg.inv(spread) + np.eye(3) / 0.49)
+    np.testing.assert_allclose(found.covariance, spread + unknown, rtol=0.02, atol=1e-3)
 
 
 def test_buildings_unlike_the_others_count_less() -> None:
