@@ -7,7 +7,6 @@ import signal
 import socket
 import sys
 import time
-from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict, dataclass, replace
@@ -24,7 +23,7 @@ from thermal.errors import ThermalError
 
 
 @dataclass(frozen=True, kw_only=True)
-class Task(ABC):
+class Task:
     """One case as it travels to a worker; where it lies is known to the classes below this one.
 
     Parameters
@@ -52,33 +51,45 @@ class Task(ABC):
     limit: float | None = None
 
     @property
-    @abstractmethod
     def name(self) -> str:
         """Name of the case."""
+        raise NotImplementedError
 
-    @abstractmethod
     def starts(self) -> list[str]:
         """Hosts and processes that began the case and did not finish it, one line each."""
+        raise NotImplementedError
 
-    @abstractmethod
     def finished(self) -> CaseOutcome | None:
         """Find results that are there: a worker may die, or be cut off, before it can say so."""
+        raise NotImplementedError
 
-    @abstractmethod
     def opened(self) -> AbstractContextManager[tuple[Path, str]]:
         """Make the case a folder of this machine, with the digest by which a later run knows it again."""
+        raise NotImplementedError
 
-    @abstractmethod
     def commit(self, files: Mapping[str, Content]) -> None:
-        """Write the results, whole or not at all."""
+        """Write the results, whole or not at all.
 
-    @abstractmethod
+        Parameters
+        ----------
+        files : mapping of str to bytes, str, dict or DataFrame
+            By name.
+        """
+        raise NotImplementedError
+
     def mark(self, line: str) -> None:
-        """Write down that a worker begins the case."""
+        """Write down that a worker begins the case.
 
-    @abstractmethod
+        Parameters
+        ----------
+        line : str
+            Host and process.
+        """
+        raise NotImplementedError
+
     def survived(self) -> None:
         """Write down that the case ended without results and without ending its worker."""
+        raise NotImplementedError
 
     def again(self) -> Self:
         """Make the next attempt."""

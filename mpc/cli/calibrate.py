@@ -60,7 +60,7 @@ def calibrate(
     Example: buildingmpc calibrate cases/office --tune 2023-10-02/2023-10-16
     --hold-out 2023-10-16T00:05/2023-10-23 --out results
     """
-    settings = {
+    settings: dict[str, Any] = {
         "tune": tune or [], "hold_out": hold_out or [], "dx": dx, "horizon": horizon,
         "scheme": scheme or "implicit_euler", "objective": objective, "loss": loss, "starts": starts, "seed": seed,
         "effects": options.ids(effects),

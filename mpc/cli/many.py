@@ -81,13 +81,25 @@ class How:
         return seconds
 
     def handling(self, executor: Executor | None) -> Handling:
-        """Say it as the library takes it."""
+        """Say it as the library takes it.
+
+        Parameters
+        ----------
+        executor : Executor or None
+            Of `executor`.
+        """
         from calibration.fleet.handling import Handling
 
         return Handling(executor or self.workers, self.retries, self.force, self.seconds)
 
     def executor(self, *folders: Path) -> AbstractContextManager[Executor | None]:
-        """Connect to the cluster, if there is one."""
+        """Connect to the cluster, if there is one.
+
+        Parameters
+        ----------
+        *folders : Path
+            That every worker must see.
+        """
         from calibration.fleet.cluster import ClusterExecutor
 
         return nullcontext() if self.scheduler is None else ClusterExecutor(self.scheduler, folders=list(folders))

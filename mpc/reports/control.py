@@ -78,11 +78,6 @@ def write_comparison(comparison: Comparison, out: str | Path, *, command: str = 
     -------
     Path
         The page.
-
-    Raises
-    ------
-    ResultsExistError
-        When the folder holds something and ``force`` is not set.
     """
     return write_results(out, comparison_files(comparison, comparison.study, command), force) / "report.html"
 

@@ -124,7 +124,7 @@ def _compared(case: Case, settings: Settings) -> Done:
     with tempfile.TemporaryDirectory() as made:
         for name in ("parameters", "controller_parameters"):
             if given.get(name) is not None:
-                given[name] = _parameters(str(given[name]), case.path.name, Path(made) / f"{name}.json")
+                given[name] = _parameters(str(given[name]), _name(case), Path(made) / f"{name}.json")
         study = study_of(case, given)
     found = compare_controllers(study, list(given["controllers"]))
     rows = [
@@ -133,6 +133,11 @@ def _compared(case: Case, settings: Settings) -> Done:
         for r in found.runs
     ]  # fmt: skip
     return Done(found, "compared", tables={"controllers": rows})
+
+
+def _name(case: Case) -> str:
+    """Name of the folder of a case."""
+    return case.building.name if case.path is None else case.path.name
 
 
 def _parameters(place: str, case: str, copy: Path) -> Path:

@@ -27,6 +27,7 @@ RUN = ("check", "effects", "doctor")
 NOT_RUN = {
     "demo": "a minute; run by tests/mpc/studies/test_demo.py",
     "calibrate": "half a minute; run by tests/mpc/test_cli.py",
+    "priors": "takes the results of calibrate; run by tests/mpc/test_cli_many.py",
     "diagnose": "a minute; run by tests/mpc/test_cli_diagnose.py",
     "evaluate": "takes the result of calibrate; run by tests/mpc/test_cli.py",
     "simulate": "takes the result of calibrate; run by tests/mpc/test_cli.py",
