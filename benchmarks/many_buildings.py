@@ -33,7 +33,7 @@ from typing import Any
 from _table import markdown, write
 
 from calibration import calibrate_many
-from calibration.fleet.case import CaseOutcome
+from calibration.fleet.outcome import CaseOutcome
 from calibration.fleet.run import case_folders
 from mpc.reports.calibration import calibration_files
 from thermal.pilot.building import PilotSettings, generate_pilot

@@ -176,7 +176,7 @@ def write_results(out: str | Path, files: Mapping[str, Content], force: bool = F
         new.mkdir()
         old.mkdir()
         for name, content in files.items():
-            _write(new / name, content)
+            (new / name).write_bytes(content_bytes(name, content))
         if folder.is_dir():
             _move_into(folder, new, old, list(files))
         else:
@@ -238,15 +238,23 @@ def _fields(value: Any) -> dict[str, Any]:
     return {f.name: plain(getattr(value, f.name)) for f in fields(value)}
 
 
-def _write(path: Path, content: Content) -> None:
+def content_bytes(name: str, content: Content) -> bytes:
+    """Spell the contents of a file of results.
+
+    Parameters
+    ----------
+    name : str
+        Of the file, for errors.
+    content : bytes, str, dict or DataFrame
+        A dict becomes JSON (NaN as null), a table Parquet; its time index must have a time zone.
+    """
     if isinstance(content, pd.DataFrame):
         if isinstance(content.index, pd.DatetimeIndex) and content.index.tz is None:
-            raise TypeError(f"{path.name}: expected stamps with a time zone, got an index without one")
-        content.to_parquet(path)
-    elif isinstance(content, bytes):
-        path.write_bytes(content)
-    else:
-        path.write_text(content if isinstance(content, str) else to_json(content) + "\n", encoding="utf-8")
+            raise TypeError(f"{name}: expected stamps with a time zone, got an index without one")
+        return bytes(content.to_parquet())
+    if isinstance(content, bytes):
+        return content
+    return (content if isinstance(content, str) else to_json(content) + "\n").encode()
 
 
 def _move_into(folder: Path, new: Path, old: Path, names: list[str]) -> None:

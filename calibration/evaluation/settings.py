@@ -9,6 +9,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from calibration.errors import CalibrationError
+from calibration.evaluation.population import Population, population_from
 from thermal._types import FloatArray
 from thermal.case.building import Building
 from thermal.effects.catalogue import chosen, is_effect
@@ -138,6 +139,8 @@ class CalibrationSettings(ModelSettings):
         `calibration.fit.ladder`.
     yardsticks : bool
         Whether simple models are fitted too, whose errors stand beside the model's.
+    population : Population, optional
+        Prior of the parameters that a fleet has taught, see `read_population`; the physical ranges by default.
 
     Raises
     ------
@@ -153,6 +156,7 @@ class CalibrationSettings(ModelSettings):
     seed: int = 0
     climb: bool = False
     yardsticks: bool = False
+    population: Population | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -198,6 +202,8 @@ def calibration_settings(
         changes["effects"] = {name: () for name in effects}
     if isinstance(structure, Mapping):
         changes["structure"] = Structure(**structure)
+    if isinstance(changes.get("population"), Mapping):
+        changes["population"] = population_from(changes["population"])
     return replace(base, **changes)
 
 

@@ -10,7 +10,8 @@ from calibration.diagnosis.decide.levels import TEMPERATURE
 from calibration.evaluation.intervals import Interval, horizon_steps
 from calibration.experiment.emulate import Emulated, Emulator
 from calibration.experiment.members import Member
-from calibration.fit.problem import Problem, tuning_runs
+from calibration.fit.problem import Problem
+from calibration.fit.tuning_runs import tuning_runs
 from thermal._types import FloatArray
 
 #: Odds from which one of two models is named: evidence is *strong* from 20 to 1 on (Kass and Raftery 1995,

@@ -17,6 +17,7 @@ from calibration.fit.likelihood import InnovationsProblem
 from calibration.fit.problem import tuning_problem
 from calibration.fit.result import CalibrationResult, SolverReport, describe
 from calibration.fit.starts import STOPPED, solve_starts
+from calibration.fit.told import told_by
 from calibration.identifiability.information import information_of
 from calibration.progress import Forward, Progress
 from thermal.case.case import Case
@@ -122,6 +123,7 @@ class FittedCase:
             settings=chosen.model,
             seed=chosen.seed,
             version=version("buildingmpc"),
+            told=told_by(best),
         )  # fmt: skip
 
     def uncalibrated(self, progress: Progress | None = None) -> dict[str, Evaluation]:
@@ -194,7 +196,7 @@ def fit_case(
     if settings.objective == "innovations":
         problem = InnovationsProblem(
             grid, inputs, problem.runs, problem.steps, problem.free, given, problem.scheme, loss=settings.loss,
-            intervals=tuple(tuned), spin_up_seconds=settings.spin_up_seconds,
+            intervals=tuple(tuned), spin_up_seconds=settings.spin_up_seconds, population=problem.population,
         ).at(first, given)  # fmt: skip
     best, failures = solve_starts(problem, first, settings.starts, settings.seed, progress, close=begin is not None)
     before = CaseModel(case, settings.model, grid, inputs, given, "start")

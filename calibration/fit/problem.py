@@ -6,16 +6,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
-from calibration.errors import CalibrationError, NotEnoughDataError
+from calibration.errors import CalibrationError
 from calibration.estimation.disturbance import DisturbanceModel
-from calibration.evaluation.intervals import Interval, Runs, default_intervals, horizon_steps, merge, select_runs
+from calibration.evaluation.intervals import Interval, Runs, default_intervals, horizon_steps, merge
+from calibration.evaluation.population import Population
 from calibration.evaluation.settings import Loss, ModelSettings, calibration_settings
+from calibration.fit.tuning_runs import tuning_runs
 from thermal._types import FloatArray
 from thermal.case.case import Case
-from thermal.model.case_replay import LEAST_SPIN_UP, SUDDEN, Inputs, free_runs, replay_inputs, spin_up
+from thermal.model.case_replay import SUDDEN, Inputs, free_runs, replay_inputs, spin_up
 from thermal.model.matrices import SymbolicModel
 from thermal.model.step import IMPLICIT_EULER, Scheme
 from thermal.parameters import Parameter
@@ -68,6 +69,8 @@ class Problem:
         estimation scale [-], by the group's base name; 0.3 where it says nothing.
     capped : bool
         Whether errors never count for more than one a day and zone, as where what the model lacks is common to them.
+    population : Population, optional
+        Of a fleet, in the place of the physical ranges of the parameters that it knows.
     """
 
     grid: SymbolicModel
@@ -82,6 +85,7 @@ class Problem:
     loss: Loss = "linear"
     shrinkage: Mapping[str, float] = field(default_factory=dict)
     capped: bool = True
+    population: Population | None = None
 
     @property
     def parameters(self) -> list[Parameter]:
@@ -102,12 +106,17 @@ class Problem:
     @property
     def centre(self) -> FloatArray:
         """Centre of the prior on the estimation scale, (n_free,) [-]."""
-        return np.array([p.transform(p.start) for p in self.parameters])
+        drawn = np.array([p.transform(p.start) for p in self.parameters])
+        return drawn if self.population is None else drawn + self.population.prior(self.parameters, self._own)[1]
 
     @property
     def prior_deviations(self) -> FloatArray:
         """Standard deviations of the prior on the estimation scale, (n_free,) [-]."""
-        return np.array([p.prior_deviation for p in self.parameters])
+        ranged = np.array([p.prior_deviation for p in self.parameters])
+        if self.population is None:
+            return ranged
+        known, _, covariance = self.population.prior(self.parameters, self._own)
+        return np.where(known, np.sqrt(np.diag(covariance)), ranged)
 
     def at(self, model: SymbolicModel, theta: FloatArray, disturbance: DisturbanceModel | None = None) -> Problem:
         """Return the problem whose residuals are weighed by a disturbance at θ: itself, as they are not whitened.
@@ -261,12 +270,20 @@ class Problem:
         parameters = self.parameters
         base = np.array([p.base for p in parameters])
         grouped = np.array([p.grouped for p in parameters])
-        spread = self.prior_deviations
+        spread = np.array([p.prior_deviation for p in parameters])
         together = (base[:, None] == base[None, :]) & (
             grouped[:, None] & grouped[None, :] | np.eye(base.size, dtype=bool)
         )
-        own = np.array([self.shrinkage.get(b, SHRINKAGE) if g else 0.0 for b, g in zip(base, grouped, strict=True)])
-        return np.where(together, np.outer(spread, spread), 0.0) + np.diag(own**2)
+        ranged = np.where(together, np.outer(spread, spread), 0.0) + np.diag(self._own**2)
+        if self.population is None:
+            return ranged
+        known, _, covariance = self.population.prior(parameters, self._own)
+        return np.where(np.outer(known, known), covariance, np.where(np.outer(~known, ~known), ranged, 0.0))
+
+    @property
+    def _own(self) -> FloatArray:
+        """Spread of each group's members about what they have in common, (n_free,) [-]; 0 where there is no group."""
+        return np.array([self.shrinkage.get(p.base, SHRINKAGE) if p.grouped else 0.0 for p in self.parameters])
 
     def weighted(self, model: SymbolicModel, z: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Residuals and Jacobian on the estimation scale: weighted data, then the priors.
@@ -344,56 +361,6 @@ def tuning_problem(case: Case, tune: Sequence[Interval] = (), settings: ModelSet
     lumped = chosen.structure.lumped
     shrinkage = dict.fromkeys(network.groups if lumped else (), _LUMPED_SHRINKAGE)
     problem = Problem(SymbolicModel(network), inputs, runs, steps, free, given, chosen.stepping)
-    return replace(problem, loss=chosen.loss, shrinkage=shrinkage, capped=not lumped)
-
-
-def tuning_runs(inputs: Inputs, intervals: Sequence[Interval], steps: int, spin_up: float) -> tuple[Runs, ...]:
-    """Choose runs that tile the tuning intervals, with a full spin-up where that leaves half of the telemetry.
-
-    A run after 12 hours starts from walls and slabs that are still wrong, and the fit would take that for physics: on a
-    twin of known parameters it cost 0.013 K of held-out error.
-
-    Parameters
-    ----------
-    inputs : Inputs
-        The telemetry.
-    intervals : sequence of Interval
-        Tuning intervals.
-    steps : int
-        N.
-    spin_up : float
-        Length of the spin-up [s].
-
-    Raises
-    ------
-    NotEnoughDataError
-        When every run misses telemetry.
-    """
-    chosen = []
-    for interval in intervals:
-        begin = max(inputs.stamps[0], interval.start - pd.Timedelta(seconds=spin_up))
-        half = 0.5 * (interval.end - begin).total_seconds()
-        try:
-            found = select_runs(inputs, interval, steps, spin_up=spin_up, least=max(LEAST_SPIN_UP, min(spin_up, half)))
-        except NotEnoughDataError:
-            found = select_runs(inputs, interval, steps, spin_up=spin_up)
-        inside = found.starts >= inputs.stamps.searchsorted(interval.start)  # every residual lies in the interval
-        chosen.append(Runs(found.begin, found.starts[inside], found.skipped))
-    runs = tuple(r for r in thin(chosen, steps) if r.starts.size)
-    if not runs:
-        raise NotEnoughDataError(
-            "tuning: every run misses inputs or zone temperatures; `buildingmpc check` shows the gaps"
-        )
-    return runs
-
-
-def thin(runs: Sequence[Runs], steps: int) -> tuple[Runs, ...]:
-    """Keep runs (of each interval) that tile the data: each stamp lies in one run of so many steps."""
-    thinned = []
-    for r in runs:
-        kept: list[int] = []
-        for start in r.starts:
-            if not kept or start >= kept[-1] + steps:
-                kept.append(int(start))
-        thinned.append(replace(r, starts=np.array(kept, dtype=np.int64)))
-    return tuple(thinned)
+    return replace(
+        problem, loss=chosen.loss, shrinkage=shrinkage, capped=not lumped, population=chosen.population
+    )

@@ -14,6 +14,7 @@ from calibration.evaluation.intervals import Interval
 from calibration.evaluation.n_step import Evaluation
 from calibration.evaluation.settings import ModelSettings, Objective
 from calibration.fit.estimate import Estimate
+from calibration.fit.told import Told
 from calibration.identifiability.information import DETERMINED, Information
 from calibration.results import Axes, Plain, Result, draw_rows, plain
 from thermal._types import FloatArray
@@ -184,6 +185,8 @@ class CalibrationResult(Result):
         What was minimised.
     rungs : tuple of Rung
         Structures that days left out chose from; empty where there was no choice.
+    told : Told or None
+        What the data alone say of the parameters, which a fleet learns its population from.
     """
 
     case: str
@@ -206,6 +209,7 @@ class CalibrationResult(Result):
     version: str = field(default="")
     objective: Objective = "multi_step"
     rungs: tuple[Rung, ...] = ()
+    told: Told | None = None
 
     def effects(self) -> list[dict[str, Any]]:
         """Effects in the model with their zones and parameters, an entry of ``calibration.json`` each."""

@@ -1,5 +1,6 @@
 """Workers of a `dask.distributed` cluster (extra ``[cluster]``)."""
 
+import math
 import pickle
 import sys
 import time
@@ -62,6 +63,8 @@ class ClusterExecutor(Executor):
             raise CalibrationError("scheduler: expected an address such as tcp://HOST:8786, got none")
         self._client = _connected(scheduler, timeout)
         self._address, self._patience = scheduler, patience
+        self.connection = -1  # schedulers that came after the first
+        self._scheduler = ""
         try:
             self._check_workers(timeout, [str(Path(folder).resolve()) for folder in folders])
         except BaseException:
@@ -69,6 +72,7 @@ class ClusterExecutor(Executor):
             raise
         self._executor: Executor = self._client.get_executor(pure=False)
         self._seen = self._looked = time.monotonic()
+        self._workers()
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
         """Run a call on one of the workers.
@@ -84,19 +88,40 @@ class ClusterExecutor(Executor):
         future: Future[T] = self._executor.submit(_unpacking(), message)
         return future
 
+    @property
+    def ready(self) -> bool:
+        """Whether calls can be submitted: not while a lost scheduler is waited for."""
+        return bool(self._client.status == "running")
+
     def trouble(self) -> str | None:
-        """Say why no more answers will come, if that is so."""
-        if self._client.status == "closed":
-            return f"scheduler {self._address}: the connection was lost"
+        """Say why no more answers will come, if that is so; a scheduler that is there again is taken up again."""
         now = time.monotonic()
+        if self._client.status == "closed":
+            self._connect_again()
+        if not self.ready:
+            lost = now - self._seen > self._patience
+            return f"scheduler {self._address}: the connection was lost for {self._patience:g} s" if lost else None
         if now - self._looked > LOOK or now - self._seen > self._patience:
             self._looked, workers = now, self._workers()
+            if not self.ready:  # lost while it was asked
+                return None
             if workers:
                 self._seen = now
             elif now - self._seen > self._patience:
                 what = "did not answer" if workers is None else "had no worker"
                 return f"scheduler {self._address}: {what} for {self._patience:g} s"
         return None
+
+    def look_now(self) -> None:
+        """Look at the scheduler before anything else is handed out: a call was cancelled."""
+        self._looked = -math.inf
+
+    def _connect_again(self) -> None:
+        """Connect to a scheduler that was started again at the same address, if there is one yet."""
+        with suppress(CalibrationError):
+            self._client = _connected(self._address, LOOK)
+            self._executor = self._client.get_executor(pure=False)
+            self.look_now()
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """Close the connection; the cluster itself stays.
@@ -119,6 +144,9 @@ class ClusterExecutor(Executor):
             known: Mapping[str, Any] = self._client.sync(self._client.scheduler.identity, callback_timeout=LOOK)
         except OSError:  # so are a lost connection and a timeout
             return None
+        if known["id"] != self._scheduler:  # another one took its place, and knows of no call of before
+            self._scheduler = known["id"]
+            self.connection += 1
         return len(known["workers"])
 
     def _check_workers(self, timeout: float, folders: list[str]) -> None:

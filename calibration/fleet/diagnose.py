@@ -8,13 +8,15 @@ from typing import Any
 from calibration.diagnosis.diagnosis import Diagnosis, diagnose
 from calibration.diagnosis.known import reasons_of
 from calibration.errors import CalibrationError
-from calibration.fleet.case import CaseOutcome
+from calibration.fleet.handling import Handling
 from calibration.fleet.job import Done, Files, Job
+from calibration.fleet.outcome import CaseOutcome
 from calibration.fleet.run import do_many
 from calibration.fleet.settings import Settings, read_intervals, spelled, split_intervals
 from calibration.progress import Progress
-from calibration.results import Content
+from calibration.results import Content, plain
 from thermal.case.case import Case
+from thermal.case.validation import has_windows
 from thermal.errors import nearest
 
 #: Settings of a diagnosis beside its intervals, with their defaults.
@@ -73,7 +75,19 @@ def diagnose_many(
     EffectError
         When an effect is not in the catalogue.
     """
-    return do_many(Job(_spell, _diagnosed, files), cases, out, settings or {}, workers, retries, force, progress)
+    job = diagnosis_job(files)
+    return do_many(job, cases, out, settings or {}, Handling(workers, retries, force), progress)
+
+
+def diagnosis_job(files: Files = diagnosis_data) -> Job:
+    """Make the job of diagnosing a case.
+
+    Parameters
+    ----------
+    files : callable
+        Makes the files of the results.
+    """
+    return Job(_spell, _diagnosed, files)
 
 
 def _spell(settings: Settings | None) -> dict[str, Any]:
@@ -98,4 +112,24 @@ def _diagnosed(case: Case, settings: Settings) -> Done:
     result = diagnose(case, tune, hold_out, **given)
     verdict, known = result.verdict.name, given.get("known", ())
     effects = tuple(effect for effect in result.final.effects if effect not in known)
-    return Done(result, "diagnosed", result.gap, result.predicts, verdict=verdict, effects=effects)
+    tables = {"effects": effect_rows(result)}
+    return Done(
+        result, "diagnosed", result.gap, result.predicts, verdict=verdict, effects=effects,
+        has_windows=has_windows(case.building), tables=tables,
+    )  # fmt: skip
+
+
+def effect_rows(result: Diagnosis) -> list[dict[str, Any]]:
+    """Rows of the table ``effects``: every effect of the catalogue, the likeliest first.
+
+    Parameters
+    ----------
+    result : Diagnosis
+        From `diagnose`.
+    """
+    kept = ("effect", "probability", "score", "retained_share", "testable", "zones", "group")
+    found = set(result.final.effects)
+    return [
+        {name: plain(getattr(c, name)) for name in kept} | {"found": c.effect in found}
+        for c in result.verdict.candidates
+    ]

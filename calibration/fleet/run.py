@@ -5,19 +5,21 @@ import shutil
 import time
 import uuid
 from collections import Counter
-from collections.abc import Generator, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Executor
 from contextlib import closing, contextmanager
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from calibration.errors import CalibrationError, ResultsExistError, WorkerLostError
-from calibration.fleet.case import RECORD, CaseOutcome, CaseTask, do_one, earlier_outcome
-from calibration.fleet.cluster import ClusterExecutor, killed_worker
-from calibration.fleet.job import Files, Job, calibrated, data_files
-from calibration.fleet.local import LocalProcesses, available_cores
-from calibration.fleet.settings import Settings, check_settings
+from calibration.errors import CalibrationError, ResultsExistError
+from calibration.fleet.case import CaseTask, earlier_outcome
+from calibration.fleet.data_set import TABLES, LocalFolder, write_data_set
+from calibration.fleet.handling import Handling
+from calibration.fleet.job import Files, Job, calibration_job, data_files
+from calibration.fleet.loop import outcomes_of
+from calibration.fleet.outcome import RECORD, CaseOutcome
+from calibration.fleet.settings import Settings
 from calibration.progress import Progress
 from calibration.results import check_results_folder, to_json
 from thermal.case.load import NAME
@@ -26,7 +28,7 @@ from thermal.case.load import NAME
 SUMMARY = "summary.json"
 
 #: Files of all cases together, which a run with pages adds beside it.
-_TOGETHER = (SUMMARY, "fleet.parquet", "fleet.csv", "fleet.xlsx", "report.html")
+_TOGETHER = (SUMMARY, TABLES, "fleet.parquet", "fleet.csv", "fleet.xlsx", "report.html")
 
 #: Folder beside the results that a run keeps while it lasts.
 RUNNING = ".running"
@@ -34,19 +36,18 @@ RUNNING = ".running"
 #: Stage of the progress.
 STAGE = "cases"
 
-#: The executor is looked at this often while nothing happens [s].
-TICK = 1.0
 
-
-def case_folders(folder: str | Path) -> tuple[Path, ...]:
+def case_folders(folder: str | Path, entry: str = NAME) -> tuple[Path, ...]:
     """Find the case folders in a folder, in the order of their names.
 
     Parameters
     ----------
     folder : str or Path
-        Whose sub-folders with a ``building.yaml`` are cases; hidden ones are not.
+        Whose sub-folders with that file are cases; hidden ones are not.
+    entry : str
+        File that makes a folder a case.
     """
-    found = (path.parent for path in Path(folder).glob(f"*/{NAME}"))
+    found = (path.parent for path in Path(folder).glob(f"*/{entry}"))
     return tuple(sorted(path for path in found if not path.name.startswith(".")))
 
 
@@ -115,8 +116,8 @@ def calibrate_many(
     >>> [o.case for o in outcomes if o.status != "calibrated"]  # doctest: +SKIP
     []
     """
-    job = Job(check_settings, calibrated, files)
-    return do_many(job, cases, out, settings or {}, workers, retries, force, progress)
+    job = calibration_job(files)
+    return do_many(job, cases, out, settings or {}, Handling(workers, retries, force), progress)
 
 
 def do_many(
@@ -124,9 +125,7 @@ def do_many(
     cases: Sequence[str | Path],
     out: str | Path,
     settings: Settings,
-    workers: Executor | int | None = None,
-    retries: int = 2,
-    force: bool = False,
+    how: Handling,
     progress: Progress | None = None,
 ) -> tuple[CaseOutcome, ...]:
     """Do a job with many cases, as `calibrate_many` calibrates them.
@@ -135,35 +134,41 @@ def do_many(
     ----------
     job : Job
         What is done.
-    cases, out, workers, retries, force, progress
+    cases, out, progress
         As in `calibrate_many`.
     settings : CalibrationSettings, or mapping of str to Any
         Of the job.
+    how : Handling
+        By whom, how often, for how long.
     """
     began = time.perf_counter()
     spelled = job.spell(settings)
-    for name, value, least in (("retries", retries, 0), ("workers", workers, 1)):
-        CalibrationError.unless(not isinstance(value, int) or value >= least, name, f"at least {least}", value)
     folder = _absolute(check_results_folder(out, force=True))
     paths = _check_cases(cases, folder)
-    if not force:
+    if not how.force:
         _refuse_other_contents(folder)
     with _claimed(folder) as running:
-        given = (running, settings, running.name, 0, retries, force, job)
-        tasks = [CaseTask(path, folder / path.name, *given) for path in paths]
-        there = {} if force else {t.name: earlier_outcome(t.case, t.out, spelled) for t in tasks}
+        tasks = [
+            CaseTask(
+                case=path, out=folder / path.name, running=running, settings=settings, run=running.name, attempt=0,
+                retries=how.retries, force=how.force, job=job, limit=how.limit,
+            )
+            for path in paths
+        ]  # fmt: skip
+        there = {} if how.force else {t.name: earlier_outcome(t.case, t.out, spelled) for t in tasks}
         found = {name: outcome for name, outcome in there.items() if outcome is not None}
         todo = [task for task in tasks if task.name not in found]
         tell = progress or (lambda stage, done, total: None)
         try:
             tell(STAGE, len(found), len(tasks))
-            with closing(_outcomes(todo, workers)) as coming:
+            with closing(outcomes_of(todo, len(todo), how.workers)) as coming:
                 for outcome in coming:
                     found[outcome.case] = outcome
                     tell(STAGE, len(found), len(tasks))
         finally:
             outcomes = tuple(found.get(t.name) or t.finished() or t.unfinished("interrupted") for t in tasks)
             _write_summary(running, outcomes, spelled, time.perf_counter() - began)
+            write_data_set(LocalFolder(folder), outcomes)
     return outcomes
 
 
@@ -245,66 +250,6 @@ def _lock(descriptor: int, out: Path) -> None:
         raise CalibrationError(f"{out}: another run writes its results here; wait for it, or choose another") from error
     except OSError:  # a file system without locks
         return
-
-
-def _outcomes(tasks: Sequence[CaseTask], workers: Executor | int | None) -> Generator[CaseOutcome, None, None]:
-    """Outcome of each case as it comes; whatever happens, no work is left behind."""
-    if not tasks:
-        return
-    own = not isinstance(workers, Executor)
-    pool = workers if isinstance(workers, Executor) else LocalProcesses(min(workers or available_cores(), len(tasks)))
-    pending: dict[Future[CaseOutcome], CaseTask] = {}
-    try:
-        waiting = list(tasks)
-        while waiting or pending:
-            trouble = _hand_out(waiting, pool, pending)
-            if trouble is not None:
-                error = WorkerLostError(f"{trouble}; the same command goes on from here")
-                for task in (*pending.values(), *waiting):
-                    yield task.finished() or task.unfinished("lost", error)
-                return
-            for future in wait(pending, TICK, FIRST_COMPLETED).done:
-                task = pending.pop(future)
-                outcome = _outcome(future, task)
-                if outcome is None:
-                    waiting.append(task.again())
-                else:
-                    yield outcome
-    finally:
-        for future in pending:
-            future.cancel()
-        if own:
-            pool.shutdown(wait=False, cancel_futures=True)
-
-
-def _hand_out(waiting: list[CaseTask], pool: Executor, pending: dict[Future[CaseOutcome], CaseTask]) -> str | None:
-    """Submit what waits; say what is wrong when the executor will never do it."""
-    trouble = pool.trouble() if isinstance(pool, ClusterExecutor) else None
-    while waiting and trouble is None:
-        try:
-            pending[pool.submit(do_one, waiting[0])] = waiting[0]
-        except RuntimeError as error:  # broken or shut down
-            trouble = f"the executor takes no more cases: {error}"
-        else:
-            waiting.pop(0)
-    return trouble
-
-
-def _outcome(future: Future[CaseOutcome], task: CaseTask) -> CaseOutcome | None:
-    """Outcome of a future that is done; None when the case is worth another worker."""
-    try:
-        return future.result()
-    except (BrokenExecutor, CancelledError) as error:
-        reason: Exception = error
-    except Exception as error:
-        if not killed_worker(error):
-            return task.unfinished("failed", error)
-        reason = error
-    if task.attempt < task.retries:
-        return None
-    times = f"{task.attempt + 1} times, at last" if task.attempt else "once"
-    text = str(reason) or type(reason).__name__
-    return task.unfinished("lost", WorkerLostError(f"its worker was lost {times}: {text}"))
 
 
 def _write_summary(running: Path, outcomes: Sequence[CaseOutcome], settings: Mapping[str, Any], seconds: float) -> None:

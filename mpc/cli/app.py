@@ -26,6 +26,7 @@ from mpc.cli.identify import identify
 from mpc.cli.imports import import_devices, import_plan, import_telemetry
 from mpc.cli.monitor import monitor
 from mpc.cli.options import displaying, switch, value
+from mpc.cli.priors import priors
 from mpc.cli.serve import label, serve
 from mpc.cli.verify import verify
 from mpc.plugins import load_plugins
@@ -123,7 +124,8 @@ _REPORTING = (
 
 for _command in (
     *(demo, doctor, check, import_plan, import_devices, import_telemetry, discover, label),
-    *(simulate, evaluate, calibrate, diagnose, experiment, monitor, effects, identify, control, compare, verify, serve),
+    *(simulate, evaluate, calibrate, priors, diagnose, experiment, monitor, effects, identify, control, compare),
+    *(verify, serve),
 ):
     app.command()(_guarded(displaying(_command) if _command in _REPORTING else _command))
 

@@ -7,12 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from calibration.errors import CalibrationError
-from mpc.cli import options
+from mpc.cli import many, options
 from mpc.cli.console import Progress, Waiting, answer, complain, say, show_table
-from mpc.cli.fleet import Scheduler, Workers, cases_in, many
 
 if TYPE_CHECKING:
     from calibration.diagnosis.diagnosis import Diagnosis
@@ -23,9 +20,9 @@ _MOST_CANDIDATES = 5
 
 
 def calibrate(
-    case: Annotated[Path, typer.Argument(metavar="CASE", help="Case folder, or a folder of case folders.")],
+    case: many.Cases,
     out: Annotated[
-        Path,
+        str,
         options.folder(
             "calibration.json, evaluation.json, predictions.parquet, report.html; of a folder of cases one such folder "
             "a case, summary.json, fleet.parquet and report.html"
@@ -47,8 +44,13 @@ def calibrate(
     loss: Annotated[str, options.value("linear, or pseudo_huber against outliers.", "LOSS")] = "linear",
     starts: Annotated[int, options.value("Starts of the solver; the best is kept.")] = 3,
     seed: Annotated[int, options.value("Seed of the further starts.")] = 0,
-    workers: Workers = None,
-    scheduler: Scheduler = None,
+    priors: Annotated[
+        Path | None, options.file("What a fleet taught, of `buildingmpc priors`; default: physical ranges.")
+    ] = None,
+    workers: many.Workers = None,
+    scheduler: many.Scheduler = None,
+    retries: many.Retries = 2,
+    limit: many.Limit = None,
     force: options.Force = False,
     json: options.Json = False,
 ) -> int:  # fmt: skip
@@ -59,7 +61,7 @@ def calibrate(
     Example: buildingmpc calibrate cases/office --tune 2023-10-02/2023-10-16
     --hold-out 2023-10-16T00:05/2023-10-23 --out results
     """
-    settings = {
+    settings: dict[str, Any] = {
         "tune": tune or [], "hold_out": hold_out or [], "dx": dx, "horizon": horizon,
         "scheme": scheme or "implicit_euler", "objective": objective, "loss": loss, "starts": starts, "seed": seed,
         "effects": options.ids(effects),
@@ -67,12 +69,17 @@ def calibrate(
         "structure": {"lumped": True, "sun": True} if structure == "lumped" else {},
     }  # fmt: skip
     CalibrationError.unless_known(structure, ("chosen", "drawn", "lumped"), "--structure", "chosen, drawn or lumped")
-    if cases := cases_in(case, out, workers, scheduler):
-        return many("calibrate", cases, out, settings, workers, scheduler, force, json)
+    if priors is not None:
+        from calibration.evaluation.population import read_population
+
+        settings["population"] = read_population(priors)
+    how = many.How(workers, scheduler, retries, limit, force, json)
+    if (code := many.of_folder("calibrate", case, out, settings, how)) is not None:
+        return code
     from mpc.reports.calibration import calibration_content
 
-    with Waiting(f"calibrate {case.name}") as progress:
-        result, report = run_calibration(case, out, force, progress, settings)
+    with Waiting(f"calibrate {Path(case).name}") as progress:
+        result, report = run_calibration(Path(case), Path(out), force, progress, settings)
     answer(json, calibration_content(result), lambda: _show(result), report)
     return _exit_code(result)
 
@@ -141,9 +148,9 @@ def _exit_code(result: CalibrationResult) -> int:
 
 
 def diagnose(
-    case: Annotated[Path, typer.Argument(metavar="CASE", help="Case folder, or a folder of case folders.")],
+    case: many.Cases,
     out: Annotated[
-        Path,
+        str,
         options.folder(
             "diagnosis.json, calibration.json of the model with the effects found, missing_watts.parquet, "
             "predictions.parquet, report.html; of a folder of cases one such folder a case, summary.json, "
@@ -167,8 +174,10 @@ def diagnose(
         ),
     ] = None,
     horizon: options.Horizon = "6h",
-    workers: Workers = None,
-    scheduler: Scheduler = None,
+    workers: many.Workers = None,
+    scheduler: many.Scheduler = None,
+    retries: many.Retries = 2,
+    limit: many.Limit = None,
     force: options.Force = False,
     json: options.Json = False,
 ) -> int:
@@ -181,17 +190,21 @@ def diagnose(
     from mpc.reports.diagnosis import diagnosis_summary
 
     settings = {"dx": dx, "horizon": horizon, "known": options.ids(effects), "ruled_out": options.ids(rule_out)}
-    if cases := cases_in(case, out, workers, scheduler):
-        CalibrationError.unless(experiment is None, "--experiment", "one case", f"a folder of {len(cases)}")
-        settings |= {"tune": tune or [], "hold_out": hold_out or []}
-        return many("diagnose", cases, out, settings, workers, scheduler, force, json)
-    with Waiting(f"diagnose {case.name}") as progress:
+    how = many.How(workers, scheduler, retries, limit, force, json)
+    if experiment is None:
+        both = {"tune": tune or [], "hold_out": hold_out or []}
+        if (code := many.of_folder("diagnose", case, out, settings | both, how)) is not None:
+            return code
+    else:
+        CalibrationError.unless(not many.is_folder(case, out), "--experiment", "one case", "a folder of them")
+    with Waiting(f"diagnose {Path(case).name}") as progress:
         if experiment is not None:
-            own = not tune and not hold_out
-            CalibrationError.unless(own, "--experiment", "no other intervals", "--tune or --hold-out")
-            result, report = _after_experiment(case, out, force, progress, experiment, settings)
+            free = not tune and not hold_out
+            CalibrationError.unless(free, "--experiment", "no other intervals", "--tune or --hold-out")
+            result, report = _after_experiment(Path(case), Path(out), force, progress, experiment, settings)
         else:
-            result, report = run_diagnosis(case, out, force, progress, (tune or (), hold_out or ()), settings)
+            own = (tune or (), hold_out or ())
+            result, report = run_diagnosis(Path(case), Path(out), force, progress, own, settings)
     return answer(json, diagnosis_summary(result), lambda: _show_diagnosis(result), report)
 
 

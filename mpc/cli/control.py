@@ -6,13 +6,14 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from mpc.cli import many
 from mpc.cli.console import Waiting, answer, complain, say, show_table
 from mpc.cli.doctor import missing_extras
-from mpc.cli.options import Dx, Force, Json, Parameters, file, folder, ids, share, spread, switch, value
+from mpc.cli.options import Dx, Force, Json, file, folder, ids, share, spread, switch, value
 
 if TYPE_CHECKING:
     from mpc.studies.demo import Demo
@@ -29,7 +30,12 @@ _OF_CASES, _OF_PLANTS = "schedule,reset,guideline36,mpc,bound", "own,full_speed,
 class StudyOptions:
     """Options that both commands have: what is controlled."""
 
-    case: Annotated[Path, typer.Argument(metavar="CASE", help="Case folder, plant.yaml, or name of a ready plant.")]
+    place: Annotated[
+        str,
+        typer.Argument(
+            metavar="CASE", help="Case folder, plant.yaml, name of a ready plant; of compare also a folder of cases."
+        ),
+    ]
     start: Annotated[
         str | None, value("Start, ISO 8601, local; of a plant.yaml by default that of its period.", "T")
     ] = None
@@ -45,7 +51,7 @@ class StudyOptions:
         value("Share of occupied steps below the band that is kept, such as 5%, or none; of a plant.yaml.", "P"),
     ] = "1%"
     starts: Annotated[int, value("Most starts of a machine in 24 hours; of a plant.yaml.")] = 10
-    parameters: Parameters = None
+    parameters: Annotated[str | None, file("calibration.json of this case; default: before calibration.")] = None
     controller_parameters: Annotated[
         Path | None,
         value("calibration.json that optimal control believes in; default: that of the plant, --parameters.", "Q"),
@@ -79,6 +85,11 @@ class StudyOptions:
     json: Json = False
 
     @property
+    def case(self) -> Path:
+        """What is controlled, as a path."""
+        return Path(self.place)
+
+    @property
     def described(self) -> bool:
         """Whether a described plant is controlled, rather than the building of a case."""
         from mpc.adapters.described.load import ready_plants
@@ -104,27 +115,17 @@ class StudyOptions:
         return PlantStudy(self.case, self.at, self.start, self.end, model, settings)
 
     def _case(self) -> Study:
-        from mpc.errors import ControlError
-        from mpc.kpi.rewards import DISCOMFORT_PRICE
-        from mpc.loop.noise import SensorNoise
-        from mpc.scenario.forecast import DAY_AHEAD_ERRORS
-        from mpc.scenario.from_text import read_comfort, read_tariff
-        from mpc.scenario.weather_files import read_epw, weather_of_case
-        from mpc.studies.study import StudySettings, make_study
+        from mpc.studies.many import study_of
         from thermal.case.load import load_case
 
-        if self.start is None or self.end is None:
-            raise ControlError("control of a case", "--start and --end", f"{self.start} and {self.end}")
-        settings = StudySettings(
-            parameters=self.parameters, controller_parameters=self.controller_parameters, dx=self.dx,
-            kind=self.plant, tariff=read_tariff(self.tariff, self.gas_price, self.currency),  # type: ignore[arg-type]
-            comfort=None if self.comfort is None else read_comfort(self.comfort),
-            noise=None if self.exact else SensorNoise(), errors={} if self.exact else DAY_AHEAD_ERRORS,
-            comfort_price=DISCOMFORT_PRICE if self.comfort_price is None else self.comfort_price, seed=self.seed,
-        )  # fmt: skip
-        case = load_case(self.case)
-        weather = weather_of_case(case) if self.weather is None else read_epw(self.weather)
-        return make_study(case.building, weather, self.start, self.end, settings)
+        return study_of(load_case(self.case), self.chosen)
+
+    @property
+    def chosen(self) -> dict[str, Any]:
+        """Settings of a case's study by name."""
+        from mpc.studies.many import COMPARISON
+
+        return {name: getattr(self, name) for name in COMPARISON if hasattr(self, name)}
 
 
 @spread
@@ -167,7 +168,7 @@ def control(
 @spread
 def compare(
     given: StudyOptions,
-    out: Annotated[Path, folder("comparison.json, a trajectory_NAME.parquet a controller, report.html")],
+    out: Annotated[str, folder("comparison.json, a trajectory_NAME.parquet a controller, report.html")],
     controllers: Annotated[
         str | None,
         value(
@@ -175,8 +176,14 @@ def compare(
             "default: all of these.", "A,B,...",
         ),
     ] = None,
+    workers: many.Workers = None,
+    scheduler: many.Scheduler = None,
+    retries: many.Retries = 2,
+    limit: many.Limit = None,
 ) -> int:
     """Run a building with several controllers on the same weather, people and prices, and compare them.
+
+    Of a folder of cases each; --parameters then is the folder of results of `buildingmpc calibrate` of these cases.
 
     Example: buildingmpc compare cases/office --controllers guideline36,mpc,bound --start 2023-10-16
     --end 2023-10-18 --out compared
@@ -187,10 +194,15 @@ def compare(
     from mpc.studies.registry import find_controller
     from mpc.studies.run import compare_controllers
 
-    check_results_folder(out, given.force)
     names = ids(controllers or (_OF_PLANTS if given.described else _OF_CASES))
     for name in names:
         find_controller(name, "plant" if given.described else "case")
+    if not given.described:
+        how = many.How(workers, scheduler, retries, limit, given.force, given.json)
+        settings = given.chosen | {"controllers": names, "parameters": many.absolute(given.parameters)}
+        if (code := many.of_folder("compare", given.place, out, settings, how)) is not None:
+            return code
+    check_results_folder(out, given.force)
     study = given.study()
     with Waiting(f"compare controllers on {given.case.name}") as progress:
         found = compare_controllers(study, names, progress)

@@ -8,13 +8,16 @@ from typing import Annotated
 
 import typer
 
-from mpc.cli import options
+from mpc.cli import many, options
 from mpc.cli.console import Waiting, answer, say, show_table
 
 
 def identify(
-    plant: Annotated[Path, typer.Argument(metavar="PLANT", help="plant.yaml, or name of a ready plant.")],
-    out: Annotated[Path, options.folder("model.json, identify.json, telemetry.parquet, report.html")],
+    plant: Annotated[
+        str,
+        typer.Argument(metavar="PLANT", help="plant.yaml, name of a ready plant, or a folder of such folders."),
+    ],
+    out: Annotated[str, options.folder("model.json, identify.json, telemetry.parquet, report.html")],
     days: Annotated[int, options.value("Length of the experiment [d].", "DAYS")] = 14,
     start: Annotated[
         str | None,
@@ -31,6 +34,10 @@ def identify(
     ] = "",
     at: Annotated[str | None, options.value("Unit or server in the place of the description's.", "FILE|URL")] = None,
     seed: Annotated[int, options.value("Seed of the excitation.")] = 0,
+    workers: many.Workers = None,
+    scheduler: many.Scheduler = None,
+    retries: many.Retries = 2,
+    limit: many.Limit = None,
     force: options.Force = False,
     json: options.Json = False,
 ) -> int:
@@ -46,12 +53,18 @@ def identify(
     from mpc.reports.identify import identify_rows, identify_summary, identify_verdict, map_rows, write_identified
     from mpc.studies.described import PlantStudy, experiment_period, run_experiment
 
-    check_results_folder(out, force)
     wanted = tuple(options.ids(actuators))
-    begin, end = (None, None) if telemetry is not None else experiment_period(plant, at, days, start)
-    study = PlantStudy(plant, at, begin, end, actuators=wanted)
+    if telemetry is None and at is None:
+        settings = {"days": days, "start": start, "actuators": wanted, "seed": seed}
+        how = many.How(workers, scheduler, retries, limit, force, json)
+        if (code := many.of_folder("identify", plant, out, settings, how)) is not None:
+            return code
+    check_results_folder(out, force)
+    path = Path(plant)
+    begin, end = (None, None) if telemetry is not None else experiment_period(path, at, days, start)
+    study = PlantStudy(path, at, begin, end, actuators=wanted)
     made = None
-    with Waiting(f"identify {plant.stem}") as progress:
+    with Waiting(f"identify {path.stem}") as progress:
         if telemetry is None:
             made = run_experiment(study, days, ExcitationSettings(seed=seed), progress)
             seen, machines = made.telemetry, made.machines

@@ -10,13 +10,14 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from calibration.results import Content, write_results
 from mpc.kpi.kpis import Kpis
 from mpc.reports.assumptions import assumption_rows
 from mpc.reports.comparison import comparison_table
 from mpc.reports.figures.control import cost_bars, course, expectations, side_by_side
 from mpc.reports.figures.style import CELSIUS
 from mpc.reports.means import NOTICED, comparison_means, control_means
-from mpc.reports.page import duration, percent, significant, write_report
+from mpc.reports.page import duration, percent, render, significant, write_report
 from mpc.studies.described import RecordedPlant
 from mpc.studies.run import Comparison, ControlRun, prediction_errors
 from thermal.case.points import POINT_TYPES, split_column
@@ -78,11 +79,21 @@ def write_comparison(comparison: Comparison, out: str | Path, *, command: str = 
     -------
     Path
         The page.
+    """
+    return write_results(out, comparison_files(comparison, comparison.study, command), force) / "report.html"
 
-    Raises
-    ------
-    ResultsExistError
-        When the folder holds something and ``force`` is not set.
+
+def comparison_files(comparison: Comparison, case: object, command: str = "") -> dict[str, Content]:
+    """Make the files of a comparison.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        Of `compare_controllers`.
+    case : object
+        On which it was made.
+    command : str
+        That led to it, for the page.
     """
     runs, (columns, rows) = comparison.runs, comparison_table(comparison)
     content = _content(runs, comparison.of("mpc") or runs[0], command) | {
@@ -96,7 +107,7 @@ def write_comparison(comparison: Comparison, out: str | Path, *, command: str = 
     }
     files: dict[str, Any] = {"comparison.json": comparison_summary(comparison)}
     files |= {f"trajectory_{run.controller}.parquet": trajectory(run) for run in runs}
-    return write_report(out, "control", content, files, force)
+    return {**files, "report.html": render("control", content)}
 
 
 def _content(runs: Sequence[ControlRun], shown: ControlRun, command: str) -> dict[str, Any]:

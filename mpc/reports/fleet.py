@@ -3,12 +3,12 @@
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from calibration.fleet.case import CaseOutcome
+from calibration.fleet.outcome import CaseOutcome
 from calibration.results import Content
 from mpc.reports.diagnosis_words import called
 from mpc.reports.display import write_results
@@ -28,10 +28,9 @@ _MODELS = {
 #: Entries of an outcome with its errors.
 _ERRORS = ("held_out_mae_before", "held_out_mae_after")
 
-Kind = Literal["calibrate", "diagnose"]
 
 
-def write_fleet(outcomes: Sequence[CaseOutcome], out: str | Path, what: Kind, horizon: str) -> Path:
+def write_fleet(outcomes: Sequence[CaseOutcome], out: str | Path, what: str, horizon: str) -> Path:
     """Write ``fleet.parquet`` and ``report.html`` beside the folders of the cases.
 
     Parameters
@@ -84,7 +83,7 @@ def fleet_table(outcomes: Sequence[CaseOutcome]) -> pd.DataFrame:
     return table
 
 
-def fleet_verdict(outcomes: Sequence[CaseOutcome], what: Kind, horizon: str) -> str:
+def fleet_verdict(outcomes: Sequence[CaseOutcome], what: str, horizon: str) -> str:
     """Say in plain words how many buildings were done, and how the error falls.
 
     Parameters
@@ -116,7 +115,7 @@ def _done(outcomes: Sequence[CaseOutcome]) -> list[CaseOutcome]:
     return [o for o in outcomes if None not in (o.held_out_mae_before, o.held_out_mae_after)]
 
 
-def _means(outcomes: Sequence[CaseOutcome], what: Kind) -> Means:
+def _means(outcomes: Sequence[CaseOutcome], what: str) -> Means:
     done, failed = _done(outcomes), [o for o in outcomes if o.error is not None]
     blind = [o.case for o in done if o.has_windows is False]
     unsure = [o.case for o in done if o.status == "not_converged"]
@@ -139,7 +138,7 @@ def _means(outcomes: Sequence[CaseOutcome], what: Kind) -> Means:
     return Means(answer, trust, f"Open the pages of the buildings with the largest errors; then {further}")
 
 
-def _content(outcomes: Sequence[CaseOutcome], what: Kind, horizon: str) -> dict[str, Any]:
+def _content(outcomes: Sequence[CaseOutcome], what: str, horizon: str) -> dict[str, Any]:
     order = sorted(outcomes, key=lambda o: -(o.held_out_mae_after or np.inf))
     return {
         "title": f"{counted(len(outcomes), 'building')} {'calibrated' if what == 'calibrate' else 'diagnosed'}",
@@ -153,7 +152,7 @@ def _content(outcomes: Sequence[CaseOutcome], what: Kind, horizon: str) -> dict[
 
 
 @styled
-def _bars(outcomes: Sequence[CaseOutcome], what: Kind, horizon: str) -> list[Picture]:
+def _bars(outcomes: Sequence[CaseOutcome], what: str, horizon: str) -> list[Picture]:
     """Draw the errors of each building, before and after."""
     shown = outcomes[:_DRAWN]
     if not shown:

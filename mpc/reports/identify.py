@@ -52,13 +52,29 @@ def write_identified(
     Path
         The page.
     """
-    files: dict[str, Content] = {
+    return write_results(out, _files(found, made, command), force) / "report.html"
+
+
+def identified_files(result: tuple[Identified, Experiment | None], plant: object) -> dict[str, Content]:
+    """Files of one of many identified plants.
+
+    Parameters
+    ----------
+    result : tuple of Identified and Experiment
+        What was found, and what led to it.
+    plant : object
+        Its description.
+    """
+    return _files(*result, "")
+
+
+def _files(found: Identified, made: Experiment | None, command: str) -> dict[str, Content]:
+    return {
         FILE: found.model.to_dict(),
         "identify.json": identify_summary(found, made),
         "telemetry.parquet": found.telemetry.to_frame(),
         "report.html": render("identify", _content(found, made, command)),
     }
-    return write_results(out, files, force) / "report.html"
 
 
 def experiment_kpis(made: Experiment) -> Kpis:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from calibration import DisturbanceModel, StateSpace
 from calibration.estimation.state_space import state_space
-from calibration.fleet.case import RECORD, CaseOutcome
+from calibration.fleet.outcome import RECORD, CaseOutcome
 from thermal import Inputs
 from thermal.model.matrices import Matrices
 from thermal.pilot.building import PilotSettings, generate_pilot
@@ -103,7 +103,7 @@ def _nothing_is_lost(out: Path, outcomes: tuple[CaseOutcome, ...], killed: int) 
     assert sorted(o.attempts for o in outcomes) == [1, 1, 2]
     assert (outcomes[0].error, outcomes[0].bad_input) == ("CaseError", True)
     assert "nearest valid one is 'F1_" in str(outcomes[0].message)
-    assert sorted(p.name for p in out.iterdir()) == ["office 0", "office 1", "summary.json"]
+    assert sorted(p.name for p in out.iterdir()) == ["office 0", "office 1", "summary.json", "tables"]
     for o in outcomes[1:]:
         assert sorted(p.name for p in (out / o.case).iterdir()) == sorted(FILES)
         content = json.loads((out / o.case / "calibration.json").read_text(encoding="utf-8"))

@@ -16,6 +16,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import pyarrow.parquet as pq
 import pytest
 from typer.testing import CliRunner
 
@@ -109,7 +110,8 @@ def test_a_run_that_is_killed_or_interrupted_goes_on(cases: Path, tmp_path: Path
     assert f"interrupted: what is finished is in {out}" in stderr and "Traceback" not in stderr
     assert not any(map(is_alive, workers))
     kept = sorted(p.name for p in out.iterdir())
-    assert kept[-1] == "summary.json" and 2 <= len(kept) <= len(NAMES)
+    assert kept[-2:] == ["summary.json", "tables"] and 3 <= len(kept) <= len(NAMES) + 1
+    kept.remove("tables")
     summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))["cases"]
     assert [name for name, entry in summary.items() if entry["status"] == "calibrated"] == kept[:-1]
     assert {entry["status"] for name, entry in summary.items() if name not in kept} == {"interrupted"}
@@ -121,12 +123,24 @@ def test_a_run_that_is_killed_or_interrupted_goes_on(cases: Path, tmp_path: Path
     assert entries == json.loads((out / "summary.json").read_text(encoding="utf-8"))["cases"]
     assert [name for name, entry in entries.items() if entry["resumed"]] == kept[:-1]
     assert {entry["status"] for entry in entries.values()} == {"calibrated"}
-    assert sorted(p.name for p in out.iterdir()) == ["fleet.parquet", *NAMES, "report.html", "summary.json"]
+    kept = ["fleet.parquet", *NAMES, "report.html", "summary.json", "tables"]
+    assert sorted(p.name for p in out.iterdir()) == sorted(kept)
 
     answer = run("calibrate", cases, "--out", out, *OPTIONS)
     assert answer.exit_code == 0
     for text in ("Held-out error 1h ahead", "office 1", "calibrated, done before", f"Results: {out}"):
         assert text in answer.stdout
+    assert run("priors", out, "--out", tmp_path / "taught").exit_code == 0
+    options = ("--priors", tmp_path / "taught" / "priors.json", "--structure", "drawn", *OPTIONS)
+    answer = run("calibrate", cases / NAMES[0], "--out", tmp_path / "new", *options, "--json")
+    alone = json.loads((out / NAMES[0] / "calibration.json").read_text(encoding="utf-8"))["parameters"]
+    taught = json.loads(answer.stdout)["parameters"]
+    assert answer.exit_code == 0 and taught.keys() and taught != alone
+    times = ("--start", "2023-10-02T06:00", "--end", "2023-10-02T12:00", "--controllers", "schedule")
+    answer = run("compare", cases, "--parameters", out, *times, "--workers", "1", "--out", tmp_path / "compared")
+    assert answer.exit_code == 0, answer.output
+    rows = pq.read_table(tmp_path / "compared" / "tables" / "controllers").to_pylist()
+    assert [(r["case"], r["controller"]) for r in rows] == [(name, "schedule") for name in NAMES]
     answer = run("calibrate", cases, "--out", out, *OPTIONS, "--horizon", "2h")
     assert (answer.exit_code, answer.stdout) == (2, "")
     assert "error: ResultsExistError: " in answer.stderr and "horizon is '1h' there and '2h' here" in answer.stderr

@@ -13,8 +13,9 @@ from calibration.evaluation import intervals
 from calibration.evaluation.intervals import Interval, horizon_steps
 from calibration.evaluation.n_step import Evaluation, EvaluationSettings, evaluate_model
 from calibration.evaluation.settings import CalibrationSettings, ModelSettings, calibration_settings
-from calibration.fit.problem import Problem, tuning_runs
+from calibration.fit.problem import Problem
 from calibration.fit.result import ParameterEstimate, describe_parameters
+from calibration.fit.tuning_runs import tuning_runs
 from thermal._types import FloatArray
 from thermal.case.case import Case
 from thermal.effects.catalogue import CATALOGUE, chosen, effect_of, is_effect

@@ -21,7 +21,7 @@ from calibration.evaluation.intervals import (
     parse_interval,
     select_runs,
 )
-from calibration.fit.problem import tuning_runs
+from calibration.fit.tuning_runs import tuning_runs
 from thermal import Case, Inputs, Telemetry, build_network, load_bundled_case, replay_inputs
 from thermal.model.case_replay import SPIN_UP
 

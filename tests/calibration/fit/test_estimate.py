@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from calibration import Interval
 from calibration.evaluation.intervals import select_runs
 from calibration.fit.estimate import estimate
-from calibration.fit.problem import Problem, thin
+from calibration.fit.problem import Problem
 from calibration.fit.starts import compensated_start, draw_starts
+from calibration.fit.tuning_runs import thin
 from thermal import SymbolicModel, build_network, free_runs, load_bundled_case, reduced_model, replay_inputs, spin_up
 from thermal.effects.catalogue import chosen
 from thermal.model.step import TR_BDF2

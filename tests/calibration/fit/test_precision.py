@@ -13,7 +13,8 @@ from calibration import Interval
 from calibration.estimation.disturbance import DisturbanceModel
 from calibration.evaluation.intervals import select_runs
 from calibration.fit.precision import Precision, drawn_errors, precision, unexplained
-from calibration.fit.problem import Problem, thin
+from calibration.fit.problem import Problem
+from calibration.fit.tuning_runs import thin
 from thermal import SymbolicModel, build_network, load_bundled_case, reduced_model, replay_inputs
 from thermal.model.reduce import ReducedModel
 

@@ -17,11 +17,13 @@ import pytest
 from calibration import CalibrationSettings, Interval, calibrate, calibrate_many
 from calibration.errors import CalibrationError, ResultsExistError
 from calibration.fit.least_squares import INTERRUPTED
-from calibration.fleet.case import RECORD, CaseOutcome, CaseTask, do_one
+from calibration.fleet.case import CaseTask
 from calibration.fleet.diagnose import diagnose_many
 from calibration.fleet.job import Job, calibrated, data_files
+from calibration.fleet.outcome import RECORD, CaseOutcome
 from calibration.fleet.run import case_folders
 from calibration.fleet.settings import check_settings
+from calibration.fleet.task import do_one
 from mpc.reports.calibration import calibration_files
 from thermal import load_case
 from thermal.errors import EffectError
@@ -136,7 +138,7 @@ def test_a_case_that_ends_its_workers_is_given_up_alone(cases: Path, tmp_path: P
     assert "lost 2 times, at last: worker process" in str(lost.message)
     assert "SIGKILL, as when memory runs out" in str(lost.message)
     assert (other.status, other.attempts) == ("calibrated", 1)
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["office 1", "summary.json"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["office 1", "summary.json", "tables"]
 
 
 def test_an_executor_that_breaks_as_a_whole_is_reported(cases: Path, tmp_path: Path, kill_always: Any) -> None:
@@ -151,7 +153,7 @@ def task(cases: Path, tmp_path: Path, **changes: Any) -> CaseTask:
     running = tmp_path / ".running" / "run"
     running.mkdir(parents=True)
     given = {"attempt": 0, "retries": 2, "force": False} | changes
-    return CaseTask(cases / "office 0", tmp_path / "office 0", running, SETTINGS, "run", job=JOB, **given)
+    return CaseTask(case=cases / "office 0", out=tmp_path / "office 0", running=running, settings=SETTINGS, run="run", job=JOB, **given)
 
 
 def test_an_executor_that_tries_again_by_itself_is_stopped(cases: Path, tmp_path: Path) -> None:
@@ -175,7 +177,7 @@ def test_a_worker_that_does_not_see_the_folder_says_so(cases: Path, tmp_path: Pa
 def test_results_whose_worker_died_before_it_could_answer_are_found(one: tuple[Path, Path], tmp_path: Path) -> None:
     case, out = one
     record = json.loads((out / "office 0" / RECORD).read_text(encoding="utf-8"))
-    given = CaseTask(case, out / "office 0", out, SETTINGS, record["run"], 1, 2, True, JOB)
+    given = CaseTask(case=case, out=out / "office 0", running=out, settings=SETTINGS, run=record["run"], attempt=1, retries=2, force=True, job=JOB)
     assert do_one(given).status == "calibrated"
     assert given.starts() == []
 
@@ -263,7 +265,7 @@ def test_a_folder_of_something_else_is_refused(cases: Path, tmp_path: Path) -> N
     with pytest.raises(ResultsExistError, match=r"found thesis\.tex; .* --force"):
         calibrate_many([cases / "office 0"], tmp_path, workers=Idle())
     assert calibrate_many([cases / "office 0"], tmp_path, workers=Idle(), force=True)[0].status == "lost"
-    assert sorted(p.name for p in tmp_path.iterdir()) == [".hidden", "summary.json", "thesis.tex"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == [".hidden", "summary.json", "tables", "thesis.tex"]
 
 
 def test_two_runs_do_not_write_to_one_folder(cases: Path, tmp_path: Path) -> None:
@@ -277,7 +279,7 @@ def test_two_runs_do_not_write_to_one_folder(cases: Path, tmp_path: Path) -> Non
     left = tmp_path / ".running" / "killed"
     left.mkdir(parents=True)  # as a run leaves behind that was killed: its lock went with it
     assert calibrate_many([cases / "office 0"], tmp_path, workers=Idle())[0].status == "lost"
-    assert [p.name for p in tmp_path.iterdir()] == ["summary.json"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["summary.json", "tables"]
 
 
 def test_hidden_folders_are_no_cases(cases: Path) -> None:

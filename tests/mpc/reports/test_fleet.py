@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from calibration.fleet.case import CaseOutcome
+from calibration.fleet.outcome import CaseOutcome
 from mpc.reports.fleet import fleet_verdict, write_fleet
 
 DONE = CaseOutcome("lit", "diagnosed", 0.5, 0.2, 3.0, verdict="named", effects=("solar_gain",), has_windows=True)

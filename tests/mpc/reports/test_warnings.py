@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 import calibration.fleet.run
-from calibration.fleet.case import CaseOutcome
-from mpc.cli import fleet as _fleet
+from calibration.fleet.outcome import CaseOutcome
+from mpc.cli import many as _many
 from mpc.reports.means import Means
 from mpc.reports.page import render
 from mpc.reports.warnings import case_warnings
@@ -39,9 +39,13 @@ def test_a_folder_of_cases_says_which_have_none(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     outcomes = [CaseOutcome(name, "calibrated", 0.5, 0.4, has_windows=name == "lit") for name in ("lit", "dark")]
-    monkeypatch.setattr(calibration.fleet.run, "calibrate_many", lambda *_, **__: outcomes)
+    monkeypatch.setattr(calibration.fleet.run, "do_many", lambda *_, **__: outcomes)
     settings = {"horizon": "6h"}
-    assert _fleet.many("calibrate", [tmp_path / "lit"], tmp_path / "out", settings, 1, None, False, False) == 0
+    for name in ("lit", "dark"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "building.yaml").touch()
+    how = _many.How(workers=1)
+    assert _many.of_folder("calibrate", str(tmp_path), str(tmp_path / "out"), settings, how) == 0
     told = capsys.readouterr()
     assert "warning: dark: 1 of 2 buildings has no windows" in told.err
     assert "calibrated, no windows" in told.out and told.out.count("no windows") == 1

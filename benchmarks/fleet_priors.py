@@ -1,0 +1,143 @@
+"""What a fleet teaches about the next building: three days of telemetry with its priors beside 14 days without.
+
+Buildings of one population (`_fleet`: generated offices of 80 m2 and 2 zones, half-hourly, winter, our own model as
+plant; true parameters are drawn about a centre that is not the drawing's). The training fleet is calibrated on 14 days
+and held out on 7, and its population learned from its data set (`calibration.fleet.priors`). The test fleet has other
+seeds; each of its buildings is calibrated three times, on 14 days, on the last 3 of them, and on these 3 with the
+fleet's priors, and judged on the same 7 days that follow. A case of 3 days holds no telemetry from before them.
+
+The centre of the population lies 0.8 of the priors' deviations off the drawing, and its spread is 0.25: the gain is
+that of such a fleet, and would be smaller where buildings are less alike; the line of the true centre as prior (what an
+endless fleet would teach) bounds it. Buildings come from the model that is fitted: nothing here is said of missing
+physics.
+
+Run: ``python benchmarks/fleet_priors.py --out results/priors [--train 100 --test 100] [--publish]``. Writes
+``fleet_priors.json`` and ``.md``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import tempfile
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from _fleet import SPREAD, make_office, population_centre
+from _table import markdown, write
+
+from calibration import Interval, calibrate, calibrate_many
+from calibration.evaluation.population import Population
+from calibration.fleet.data_set import LocalFolder
+from calibration.fleet.priors import population_of
+from calibration.fleet.run import case_folders
+from thermal.case.case import Case
+from thermal.case.load import load_case
+
+LONG, SHORT, HELD_OUT = 14.0, 3.0, 7.0  # days
+FIRST_TEST = 10_000  # seed
+SETTINGS: dict[str, Any] = {"starts": 1}
+COLUMNS = ("calibrated on", "priors", "median [K]", "quartiles [K]", "mean [K]", "better than 14 days without in")
+
+
+def intervals(case: Case) -> dict[str, Interval]:
+    """Days that tune, and days that judge."""
+    start = case.stamps[0]
+    cuts = {days: start + pd.Timedelta(days=days) for days in (LONG - SHORT, LONG, LONG + HELD_OUT)}
+    step = case.stamps[1] - start
+    return {
+        "long": Interval(start, cuts[LONG]),
+        "short": Interval(cuts[LONG - SHORT], cuts[LONG]),
+        "held_out": Interval(cuts[LONG] + step, min(cuts[LONG + HELD_OUT], case.stamps[-1])),
+    }
+
+
+def shortened(case: Case, since: pd.Timestamp) -> Case:
+    """Leave out what was measured before a time."""
+    return replace(case, telemetry=replace(case.telemetry, frame=case.telemetry.frame.loc[since:]))
+
+
+def train(folder: Path, count: int) -> tuple[Population, int]:
+    """Calibrate the training fleet and learn its population; also how many did not make it."""
+    for seed in range(count):
+        make_office(folder / "cases" / f"office_{seed:05d}", seed, LONG + HELD_OUT)
+    cases = case_folders(folder / "cases")
+    found = calibrate_many(cases, folder / "results", SETTINGS, workers=1)
+    return population_of(LocalFolder(folder / "results")), sum(o.status != "calibrated" for o in found)
+
+
+def true_population(learned: Population, prior: dict[str, float]) -> Population:
+    """Make the population that an endless fleet would teach."""
+    deviation = np.array([prior[name] for name in learned.names])
+    centre = population_centre(list(learned.names))
+    mean = np.array([centre[name] for name in learned.names]) * deviation
+    return replace(learned, mean=mean, covariance=np.diag((SPREAD * deviation) ** 2))
+
+
+def judge(folder: Path, seed: int, learned: Population) -> dict[str, Any]:
+    """Held-out errors of a building of the test fleet [K]."""
+    make_office(folder, seed, LONG + HELD_OUT)
+    case = load_case(folder)
+    cut = intervals(case)
+    three = shortened(case, cut["short"].start)
+    first = calibrate(case, [cut["long"]], [cut["held_out"]], settings=SETTINGS)
+    deviations = {p.base: p.prior_deviation for p in first.information.estimated}
+    found = {"14 days": first}
+    priors = {"3 days": None, "3 days, fleet": learned, "3 days, truth": true_population(learned, deviations)}
+    for name, population in priors.items():
+        given = SETTINGS | {"population": population}
+        found[name] = calibrate(three, [cut["short"]], [cut["held_out"]], settings=given)
+    more = SETTINGS | {"population": learned}
+    found["14 days, fleet"] = calibrate(case, [cut["long"]], [cut["held_out"]], settings=more)
+    errors = {name: result.calibrated["held_out"].metrics.mae for name, result in found.items()}
+    return {"seed": seed, "drawn": first.uncalibrated["held_out"].metrics.mae, **errors}
+
+
+def rows(judged: list[dict[str, Any]]) -> list[list[Any]]:
+    """Lay out the table."""
+    made = []
+    for name, on, priors in (
+        ("drawn", "nothing", "–"), ("14 days", "14 days", "physical ranges"), ("3 days", "3 days", "physical ranges"),
+        ("3 days, fleet", "3 days", "of the fleet"), ("3 days, truth", "3 days", "true population"),
+        ("14 days, fleet", "14 days", "of the fleet"),
+    ):  # fmt: skip
+        errors = np.array([j[name] for j in judged])
+        better = sum(j[name] < j["14 days"] for j in judged)
+        low, middle, high = np.quantile(errors, (0.25, 0.5, 0.75))
+        share = "–" if name == "14 days" else f"{better} of {len(judged)}"
+        made.append([on, priors, f"{middle:.4f}", f"{low:.4f} to {high:.4f}", f"{errors.mean():.4f}", share])
+    return made
+
+
+def main() -> None:
+    """Train, test, and write the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--out", type=Path, required=True, help="folder of the results")
+    parser.add_argument("--train", type=int, default=100, help="buildings to learn from")
+    parser.add_argument("--test", type=int, default=100, help="buildings to judge on")
+    parser.add_argument("--publish", action="store_true", help="replace the table between its marks")
+    options = parser.parse_args()
+    began, load = time.process_time(), os.getloadavg()[0]
+    with tempfile.TemporaryDirectory() as folder:
+        learned, failed = train(Path(folder) / "train", options.train)
+        judged = []
+        for seed in range(FIRST_TEST, FIRST_TEST + options.test):
+            judged.append(judge(Path(folder) / f"office_{seed}", seed, learned))
+            print(f"{len(judged)} of {options.test}, {time.process_time() - began:.0f} s of CPU", flush=True)
+            print(markdown(COLUMNS, rows(judged)), flush=True)
+    table = markdown(COLUMNS, rows(judged))
+    note = (
+        f"{options.train} buildings to learn from ({failed} without a converged calibration), {options.test} others to "
+        f"judge on; MAE 6 h ahead on the same 7 days. {time.process_time() - began:.0f} s of CPU for the tests.\n"
+    )
+    data = {"judged": judged, "population": learned.to_dict(), "failed": failed, "load": load}
+    write(options.out, "fleet_priors", f"{table}\n{note}", data, options.publish)
+    print(table, note, sep="\n")
+
+
+if __name__ == "__main__":
+    main()
