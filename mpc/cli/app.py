@@ -23,6 +23,7 @@ from mpc.cli.experiment import experiment
 from mpc.cli.identify import identify
 from mpc.cli.imports import import_devices, import_plan, import_telemetry
 from mpc.cli.monitor import monitor
+from mpc.cli.operate import operate, replay
 from mpc.cli.options import displaying, switch, value
 from mpc.cli.serve import label, serve
 from mpc.plugins import load_plugins
@@ -118,7 +119,7 @@ _REPORTING = (demo, check, simulate, evaluate, calibrate, diagnose, experiment, 
 
 for _command in (
     *(demo, doctor, check, import_plan, import_devices, import_telemetry, label),
-    *(simulate, evaluate, calibrate, diagnose, experiment, monitor, effects, identify, control, compare, serve),
+    *(simulate, evaluate, calibrate, diagnose, experiment, monitor, effects, identify, control, compare, operate, replay, serve),
 ):
     app.command()(_guarded(displaying(_command) if _command in _REPORTING else _command))
 

@@ -12,7 +12,8 @@ from mpc.adapters.boptest.mapping import BoptestSignals
 from mpc.adapters.boptest.plant import BoptestPlant, BoptestSettings, BoptestTime
 from mpc.adapters.boptest.scenario import DAY, PRICE_POINTS, YearClock
 from mpc.adapters.described.conditions import SeriesSource, described_forecaster
-from mpc.adapters.described.schema import EnergyPlusProgram, Period, PlantFile, ServerProgram, UnitProgram, Value
+from mpc.adapters.described.programs import EnergyPlusProgram, ServerProgram, SiteProgram, UnitProgram
+from mpc.adapters.described.schema import Period, PlantFile, Value
 from mpc.adapters.described.series import NamedSeries, read_table, run_ahead, unit_period, unit_tables
 from mpc.adapters.energyplus.input import building_path, weather_path
 from mpc.adapters.energyplus.signals import EnergyPlusRun, EnergyPlusSignalPlant, EnergyPlusSignals
@@ -77,6 +78,9 @@ def load_plant(
     parsed, place = read_description(path, at=at, changes=changes), _place(path)
     if isinstance(parsed.plant, ServerProgram):
         return _server_plant(parsed, parsed.plant)
+    if isinstance(parsed.plant, SiteProgram):
+        advice = "run it with: buildingmpc operate site.yaml"
+        raise PlantError("plant.kind", "a program that stands for the building", "'site', a real one", advice)
     if isinstance(parsed.plant, EnergyPlusProgram):
         return _energyplus(parsed, parsed.plant, place.parent)
     return _unit_plant(parsed, parsed.plant, place.parent)
