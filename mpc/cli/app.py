@@ -119,7 +119,8 @@ _REPORTING = (demo, check, simulate, evaluate, calibrate, diagnose, experiment, 
 
 for _command in (
     *(demo, doctor, check, import_plan, import_devices, import_telemetry, label),
-    *(simulate, evaluate, calibrate, diagnose, experiment, monitor, effects, identify, control, compare, operate, replay, serve),
+    *(simulate, evaluate, calibrate, diagnose, experiment, monitor, effects, identify, control, compare),
+    *(operate, replay, serve),
 ):
     app.command()(_guarded(displaying(_command) if _command in _REPORTING else _command))
 

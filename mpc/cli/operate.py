@@ -23,7 +23,7 @@ def operate(
     part: Annotated[
         str | None, value(f"Run one of {', '.join(_PARTS)} alone, in this process; default: all.", "PART")
     ] = None,
-    check: Annotated[bool, typer.Option("--check", help="Read the files, say what would be operated, and end.")] = False,
+    check: Annotated[bool, typer.Option("--check", help="Read the files, say what they ask for, and end.")] = False,
     status: Annotated[bool, typer.Option("--status", help="Say what the guard of a running site does.")] = False,
     approve: Annotated[
         str, value("Approve the values of advised points in the plan that is in force; 'all' for all.", "POINT,...")
@@ -122,7 +122,6 @@ def _status(site: Site, json: bool) -> int:
 
 def _ask(site: Site, approve: str, mode: str, json: bool) -> int:
     """Send an operator's request, signed with the key of the site's folder."""
-    from mpc.live.clock import Clock
     from mpc.live.guard.socket import GuardClient
     from mpc.live.operators import operator_key, sign
 

@@ -36,17 +36,17 @@ class Collector:
     site : Site
         As read.
     clock : Clock, optional
-        The machine's by default, as fast as the site says.
+        The site's by default.
     """
 
     def __init__(self, site: Site, clock: Clock | None = None) -> None:
-        self.site, self.clock = site, clock or Clock(site.file.clock_rate)
+        self.site, self.clock = site, clock or site.clock()
         database = site.file.database
         kinds = {name: POINT_TYPES.get(name.rpartition("/")[2]) for name in site.file.points}
         units = {name: SIGNAL_UNITS[kind.quantity] for name, kind in kinds.items() if kind is not None}
         self.recorder = Recorder(
             Historian(database.address, database.schema_name), Spool(site.folder / "spool", database.spool * 10**6),
-            units, retry=self.clock.real(10.0), now=self.clock.mono if self.clock.rate == 1.0 else _machine,
+            units, retry=self.clock.real(10.0),
         )  # fmt: skip
         self.log = AuditLog(site.folder, "collector", self.clock.wall())
         self.log.append("start", {"code": code_version(), "configuration": site.hash, "wall": self.clock.wall()})
@@ -122,13 +122,6 @@ class Collector:
             self.recorder.historian.trim(pd.Timestamp(wall - 86_400.0 * kept, unit="s", tz="UTC"))
 
 
-def _machine() -> float:
-    """Monotonic clock of the machine [s]."""
-    import time
-
-    return time.monotonic()
-
-
 def run_collector(site: Site, clock: Clock | None = None) -> int:
     """Collect a site's samples until the process is ended; return the exit code.
 
@@ -137,7 +130,7 @@ def run_collector(site: Site, clock: Clock | None = None) -> int:
     site : Site
         As read.
     clock : Clock, optional
-        The machine's by default.
+        The site's by default.
     """
 
     async def main() -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import signal
 import threading
 from types import FrameType
@@ -16,14 +17,17 @@ from mpc.live.clock import Clock
 from mpc.live.guard.socket import GuardClient
 from mpc.live.historian.store import Historian
 from mpc.live.outlook import Outlook
-from mpc.live.planner import Planner, forecast_to_dict, needed_columns
+from mpc.live.planner import Planner, forecast_to_dict, needed_columns, no_plan
 from mpc.live.site import Site
 from mpc.live.state import write_state
 from mpc.loop.plant import Controller
-from thermal.case.points import POINT_TYPES
+from thermal.case.points import POINT_TYPES, ZONE_TEMPERATURE
 
 #: Beats within the longest silence that the guard bears: two may be lost.
 _BEATS = 4.0
+
+#: Looks at the measurements within a control step, so that a plan is withdrawn well before its step is over.
+_LOOKS = 5.0
 
 
 class ControlProcess:
@@ -34,18 +38,19 @@ class ControlProcess:
     site : Site
         As read.
     clock : Clock, optional
-        The machine's by default, as fast as the site says.
+        The site's by default.
     controller : Controller, optional
         In the place of the site's own.
     """
 
     def __init__(self, site: Site, clock: Clock | None = None, controller: Controller | None = None) -> None:
-        self.site, self.clock = site, clock or Clock(site.file.clock_rate)
+        self.site, self.clock = site, clock or site.clock()
         self.planner, self.outlook = Planner(site, controller), Outlook(site.plant_path, site.plant)
         database = site.file.database
         patience = max(self.clock.real(site.step / 3.0), 0.1)
         self.historian = Historian(database.address, database.schema_name, min(patience, 10.0))
         self.columns = needed_columns(site)
+        self.zones = [f"{zone}/{ZONE_TEMPERATURE}" for zone in site.plant.zones]
         self.log = AuditLog(site.folder, "controller", self.clock.wall())
         self.log.append(
             "start", {"code": code_version(), "configuration": site.hash, "site": site.path.name,
@@ -67,13 +72,41 @@ class ControlProcess:
                 plan = self.plan(begin)
                 answer = client.ask({"kind": "plan", "plan": plan})
                 write_state(self.site.folder / "controller.json", plan | {"answer": answer, "wall": now})
-                wait = self.clock.real(begin + step - self.clock.wall())
-                self._stop.wait(max(wait, 0.0) if plan["status"] == "planned" else max(min(wait, wait / 4.0), 0.0))
+                self._watch(begin + step, plan, client)
             return 0
         finally:
             client.close()
             self.historian.close()
             self.log.close()
+
+    def _watch(self, end: float, plan: dict[str, Any], client: GuardClient) -> None:
+        """Wait for the end of a step, or, without a plan, for a part of it; withdraw the plan when its inputs fail."""
+        limits = self.site.limits()
+        look = limits["step"] / _LOOKS
+        while (left := end - self.clock.wall()) > 0.0 and left <= limits["step"]:
+            if self._stop.wait(self.clock.real(min(left, look))) or plan["status"] != "planned":
+                return
+            trouble = self._trouble(limits["input_age"])
+            if trouble:
+                made = self.clock.wall()
+                plan = plan | no_plan(f"withdrawn: {trouble}") | {"number": int(10.0 * made), "made": made}
+                self.log.append("withdraw", {"plan": plan})
+                client.ask({"kind": "plan", "plan": plan})
+
+    def _trouble(self, oldest: float) -> str:
+        """Say why the measurements of now would not bear a plan."""
+        now = self.clock.wall()
+        try:
+            known = self.historian.latest(self.zones, now)
+        except HistorianError as error:
+            return f"the historian does not answer: {error}"
+        for zone in self.zones:
+            time, value = known.get(zone, (now, math.nan))
+            if value != value:
+                return f"{zone} is no number"
+            if now - time > oldest:
+                return f"{zone} is {now - time:.0f} s old"
+        return ""
 
     def _end(self, number: int, frame: FrameType | None) -> None:
         self._stop.set()
@@ -136,7 +169,7 @@ def run_controller_process(site: Site, clock: Clock | None = None) -> int:
     site : Site
         As read.
     clock : Clock, optional
-        The machine's by default.
+        The site's by default.
     """
     try:
         return ControlProcess(site, clock).run()

@@ -98,18 +98,18 @@ class Planner:
             that may not, ``reasons``, ``ahead``: what is expected, and ``expects``.
         """
         if inputs["trouble"]:
-            return _none(inputs["trouble"])
+            return no_plan(inputs["trouble"])
         seen = [math.nan if inputs["means"].get(c) is None else inputs["means"][c] for c in self._layout.columns]
         measured = Measurements(self._layout, round(inputs["begin"]), np.array(seen))
         try:
             action = self.controller.step(measured, forecast_of_dict(inputs["forecast"]))
         except (MpcError, ArithmeticError, ValueError, KeyError, IndexError) as error:
-            return _none(f"no plan: {type(error).__name__}: {error}")
+            return no_plan(f"no plan: {type(error).__name__}: {error}")
         if isinstance(action, PlannedAction) and action.solution is None:
-            return _none("no plan: " + ", ".join(action.reasons))
+            return no_plan("no plan: " + ", ".join(action.reasons))
         values = {name: float(value) for name, value in action.items()}
         if not all(math.isfinite(value) for value in values.values()):
-            return _none("no plan: a value is no number")
+            return no_plan("no plan: a value is no number")
         allowed = self.site.writable
         return {
             "status": "planned",
@@ -120,7 +120,14 @@ class Planner:
         }
 
 
-def _none(why: str) -> dict[str, Any]:
+def no_plan(why: str) -> dict[str, Any]:
+    """Say that there is nothing to follow.
+
+    Parameters
+    ----------
+    why : str
+        The reason.
+    """
     return {"status": " ".join(why.split())[:200], "values": {}, "other": {}, "reasons": [], "ahead": None}
 
 

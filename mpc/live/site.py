@@ -12,6 +12,7 @@ from pydantic import Field, ValidationError, model_validator
 from mpc.adapters.described.load import read_description
 from mpc.adapters.described.schema import Kelvin, PlantFile
 from mpc.errors import LiveError
+from mpc.live.clock import Clock, SimulatedClock
 from mpc.loop.conversion import Conversion, conversion
 from thermal.case.building import Entry, Number, Positive, Text
 from thermal.case.points import POINT_TYPES
@@ -156,7 +157,8 @@ class GuardEntry(Entry):
     plan_age : float, optional
         Age from which on a plan is not followed any more [s]; one and a half control steps.
     input_age : float, optional
-        Age from which on a measurement that a plan rests on is too old [s]; a control step.
+        Age from which on a measurement that a plan rests on is too old [s]; three readings, a fifth of the control
+        step at least and a whole one at most.
     clock_jump : float
         Largest difference between the steps of the wall clock and of the monotonic one [s].
     override_hold : float, optional
@@ -322,6 +324,12 @@ class Site:
             name: conversion(name.rpartition("/")[2], entry.at, entry.unit) for name, entry in self.file.points.items()
         }
 
+    def clock(self) -> Clock:
+        """Give the site's clock: the machine's, or one that runs faster, of which the site's folder has the state."""
+        if self.file.clock_rate == 1.0:
+            return Clock()
+        return SimulatedClock(self.folder / "clock.json", self.file.clock_rate)
+
     @property
     def writable(self) -> dict[str, PointEntry]:
         """Points that may ever be written to: those with a range, a rate and a release."""
@@ -379,7 +387,7 @@ class Site:
             "tick": own.tick or min(step / 10.0, 60.0),
             "heartbeat": own.heartbeat or step / 5.0,
             "plan_age": own.plan_age or 1.5 * step,
-            "input_age": own.input_age or step,
+            "input_age": own.input_age or min(max(3.0 * self.file.collect, step / 5.0), step),
             "clock_jump": own.clock_jump,
             "override_hold": step if own.override_hold is None else own.override_hold,
             "stuck": own.stuck,

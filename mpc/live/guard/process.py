@@ -34,7 +34,7 @@ class GuardProcess:
     site : Site
         As read.
     clock : Clock, optional
-        The machine's by default, as fast as the site says.
+        The site's by default.
 
     Raises
     ------
@@ -43,7 +43,7 @@ class GuardProcess:
     """
 
     def __init__(self, site: Site, clock: Clock | None = None) -> None:
-        self.site, self.clock = site, clock or Clock(site.file.clock_rate)
+        self.site, self.clock = site, clock or site.clock()
         self.rules = rules_of(site)
         self._lock = os.open(site.folder / "guard.lock", os.O_CREAT | os.O_RDWR, 0o600)
         try:
@@ -200,7 +200,7 @@ def run_guard(site: Site, clock: Clock | None = None) -> int:
     site : Site
         As read.
     clock : Clock, optional
-        The machine's by default.
+        The site's by default.
     """
 
     async def main() -> int:

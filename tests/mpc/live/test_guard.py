@@ -246,7 +246,7 @@ def test_modes_and_approvals() -> None:
     for _ in range(70):
         bench.tick(plan=True)
     assert bench.ours() == {PLAIN}  # an hour is over
-    off = {"kind": "mode", "points": [PLAIN], "mode": "shadow", "nonce": "d", "expires": bench.wall + 100, "by": "x",
+    off = {"kind": "mode", "points": [PLAIN], "mode": "shadow", "nonce": "d", "expires": bench.wall + 1e6, "by": "x",
            "invalid": ""}  # fmt: skip
     assert bench.tick(messages=[off])["releases"] == [PLAIN] and bench.ours() == set()
     assert "no mode" in bench.tick(messages=[off | {"nonce": "e", "mode": "on"}])["refused"][0]
