@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError, model_validator
 
-from mpc.adapters.described.load import read_description
+from mpc.adapters.described.read import read_description
 from mpc.adapters.described.schema import Kelvin, PlantFile
 from mpc.errors import LiveError
 from mpc.live.clock import Clock, SimulatedClock

@@ -10,7 +10,8 @@ from typing import Any
 
 import pandas as pd
 
-from mpc.adapters.described.load import load_plant, period_of, read_description
+from mpc.adapters.described.load import load_plant, period_of
+from mpc.adapters.described.read import read_description
 from mpc.adapters.described.schema import PlantFile
 from mpc.baselines.plants import FullSpeed
 from mpc.control.identified.controller import IdentifiedController, IdentifiedSettings

@@ -7,7 +7,6 @@ from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from mpc.live.site import BacnetLink, Mode, Site
-from mpc.loop.actuators import Actuator, ActuatorKind
 from thermal.case.points import POINT_TYPES, ZONE_TEMPERATURE
 
 
@@ -39,11 +38,11 @@ class PointRule:
     rate: float
     release: float | Literal["relinquish"]
     priority: int | None
-    kind: ActuatorKind = "continuous"
+    kind: Literal["continuous", "on_off", "modulating"] = "continuous"
     minimum: float | None = None
 
     def takes(self, value: Any) -> bool:
-        """Tell whether a value may be written.
+        """Tell whether a value may be written, by code of the guard's own: the controller's is what it checks.
 
         Parameters
         ----------
@@ -52,7 +51,10 @@ class PointRule:
         """
         if isinstance(value, bool) or not isinstance(value, int | float):
             return False
-        return Actuator("", "1", self.lowest, self.highest, False, self.kind, self.minimum).accepts(float(value))
+        if self.kind == "on_off":
+            return value in (self.lowest, self.highest)
+        least = self.lowest if self.minimum is None else self.minimum
+        return least <= value <= self.highest or (self.minimum is not None and value == self.lowest)
 
 
 @dataclass(frozen=True)
@@ -128,10 +130,10 @@ def rules_of(site: Site) -> GuardRules:
     points = {}
     for name, entry in site.writable.items():
         link, actuator = site.file.connections[entry.connection], site.plant.actuators[name]
-        assert_range, release, rate = entry.range, entry.release, entry.rate
-        if assert_range is None or release is None or rate is None:
+        ends, release, rate = entry.range, entry.release, entry.rate
+        if ends is None or release is None or rate is None:
             continue
-        low, high = assert_range
+        low, high = ends
         points[name] = PointRule(
             entry.mode, low, high, rate, release, link.priority if isinstance(link, BacnetLink) else None,
             actuator.kind or "continuous", actuator.minimum,

@@ -166,7 +166,7 @@ class Historian:
                 "SELECT name, array_agg(extract(epoch FROM time)::float8 ORDER BY time), "
                 "array_agg(value ORDER BY time) FROM sample JOIN point ON point.id = point "
                 "WHERE name = ANY(%s) AND time >= %s AND time < %s GROUP BY name",
-                [list(columns), start.to_pydatetime(), end.to_pydatetime()],
+                [list(columns), start.floor("us").to_pydatetime(), end.floor("us").to_pydatetime()],
             )
             return cursor.fetchall()
 
@@ -229,7 +229,7 @@ class Historian:
         """
 
         def work(cursor: psycopg.Cursor[Any]) -> int:
-            cursor.execute("DELETE FROM sample WHERE time < %s", [before.to_pydatetime()])
+            cursor.execute("DELETE FROM sample WHERE time < %s", [before.floor("us").to_pydatetime()])
             return int(cursor.rowcount)
 
         return self._run("trim", work)

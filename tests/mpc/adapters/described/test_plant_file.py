@@ -14,7 +14,8 @@ import pytest
 import yaml
 
 from mpc.adapters.boptest.scenario import YearClock
-from mpc.adapters.described.load import READY, _mappings, _span, load_plant, ready_plants
+from mpc.adapters.described.load import _mappings, _span, load_plant
+from mpc.adapters.described.read import READY, ready_plants
 from mpc.adapters.described.schema import Period, PlantFile
 from mpc.adapters.described.series import NamedSeries, read_table, unit_period
 from mpc.adapters.fmu.plant import FmuSignals
