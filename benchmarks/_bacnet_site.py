@@ -89,7 +89,7 @@ class Wire(asyncio.DatagramProtocol):
             return
         if address not in self._ways:
             self._ways[address] = []
-            asyncio.ensure_future(self._open(address, data))
+            self._opening = asyncio.ensure_future(self._open(address, data))
         elif isinstance(self._ways[address], list):
             self._ways[address].append(data)
         else:
@@ -134,6 +134,7 @@ class SimulatedSite:
     seed: int = 0
     frozen: bool = False
     absurd: float | None = None
+    outdoor: float | None = None
     slots: list[Slot] = field(default_factory=list)
     now: dict[tuple[int, int], float] = field(default_factory=dict)
     temperatures: dict[str, float] = field(default_factory=dict)
@@ -225,7 +226,7 @@ class SimulatedSite:
 
     async def _step(self, passed: float, rng: random.Random) -> None:
         """Let the building go on, exactly over the step, and tell the inputs."""
-        shown: dict[int, float] = {1: OUTDOOR}
+        shown: dict[int, float] = {1: OUTDOOR if self.outdoor is None else self.outdoor}
         for k, zone in enumerate(ZONES):
             told = await self._server.read_property(
                 self._object(2, k + 1), self._rb.PropertyIdentifier.PRESENT_VALUE

@@ -1,4 +1,4 @@
-"""A part of a site in a drill: as in operation, but for a controller whose solver fails on outdoor air of one's choice."""
+"""A part of a site in a drill: as in operation, but for a controller that fails on outdoor air of one's choice."""
 
 from __future__ import annotations
 

@@ -69,7 +69,8 @@ def site_text(address: str, device: str) -> str:
         *(f"  {zone}/heating_power_sensor: {{connection: hall, at: 'analog-input,{k}', unit: W}}"
           for k, zone in ((4, "north"), (5, "south"))),
         *(f"  {name}: {{connection: hall, at: 'analog-value,{k}', unit: degC, mode: act, range: [{LOW} degC, {HIGH} "
-          f"degC], rate: {rate}, release: relinquish}}" for k, (name, rate) in enumerate(zip(SETPOINTS, RATES), 1)),
+          f"degC], rate: {rate}, release: relinquish}}"
+          for k, (name, rate) in enumerate(zip(SETPOINTS, RATES, strict=True), 1)),
     ]  # fmt: skip
     return "\n".join(lines) + "\n"
 
@@ -107,6 +108,8 @@ class Stack:
         self.clock = self.site.clock()
         self.processes: dict[str, subprocess.Popen[bytes]] = {}
         self.cpu: dict[str, float] = {}
+        self._events: dict[str, list[dict[str, Any]]] = {}
+        self._seen: dict[Path, int] = {}
 
     def start(self, *parts: str) -> None:
         """Start parts."""
@@ -142,11 +145,14 @@ class Stack:
 
     def events(self, part: str) -> list[dict[str, Any]]:
         """Events of a part's log, without a check of its chain."""
-        found = []
+        found = self._events.setdefault(part, [])
         for path in sorted(self.site.folder.glob(f"{part}-[0-9]*.jsonl")):
-            for line in path.read_bytes().splitlines(keepends=True):
-                if line.endswith(b"\n"):
-                    found.append(json.loads(line))
+            with path.open("rb") as file:
+                file.seek(self._seen.get(path, 0))
+                whole = file.read().rpartition(b"\n")[0]
+            if whole:
+                self._seen[path] = self._seen.get(path, 0) + len(whole) + 1
+                found += [json.loads(line) for line in whole.splitlines()]
         return found
 
     def close(self) -> None:

@@ -61,3 +61,7 @@ class PostgresServer:
     def stop(self) -> None:
         """Stop at once, as a crash does; what was committed stays."""
         subprocess.run([*self._control, "-m", "immediate", "stop"], check=True, capture_output=True, cwd=self.folder)
+
+    def restart(self) -> None:
+        """Begin anew, whether it runs or not."""
+        subprocess.run([*self._control, "-m", "immediate", "restart"], check=True, capture_output=True, cwd=self.folder)

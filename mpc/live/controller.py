@@ -50,6 +50,7 @@ class ControlProcess:
         patience = max(self.clock.real(site.step / 3.0), 0.1)
         self.historian = Historian(database.address, database.schema_name, min(patience, 10.0))
         self.columns = needed_columns(site)
+        self._still: dict[str, tuple[float, float]] = {}
         self.zones = [f"{zone}/{ZONE_TEMPERATURE}" for zone in site.plant.zones]
         self.log = AuditLog(site.folder, "controller", self.clock.wall())
         self.log.append(
@@ -100,12 +101,17 @@ class ControlProcess:
             known = self.historian.latest(self.zones, now)
         except HistorianError as error:
             return f"the historian does not answer: {error}"
+        stuck, kind = self.site.limits()["stuck"], POINT_TYPES[ZONE_TEMPERATURE]
         for zone in self.zones:
             time, value = known.get(zone, (now, math.nan))
-            if value != value:
-                return f"{zone} is no number"
+            if not kind.possible(value):
+                return f"{zone} is no number" if value != value else f"{zone} is {kind.told(value)}"
             if now - time > oldest:
                 return f"{zone} is {now - time:.0f} s old"
+            before, since = self._still.get(zone, (math.nan, time))
+            self._still[zone] = (value, since if value == before else time)
+            if stuck is not None and now - self._still[zone][1] > stuck:
+                return f"{zone} has not moved for {now - self._still[zone][1]:.0f} s"
         return ""
 
     def _end(self, number: int, frame: FrameType | None) -> None:
@@ -138,6 +144,7 @@ class ControlProcess:
             inputs["means"] = {k: _mean(k, v) for k, v in self.historian.read(asked, start, end).items()}
             latest = {k: [time, value if value == value else None] for k, (time, value) in known.items()}
             inputs["forecast"] = forecast_to_dict(self.outlook.at(begin))
+            inputs["trouble"] = self._trouble(self.site.limits()["input_age"])
         except HistorianError as error:
             inputs["trouble"] = f"the historian does not answer: {error}"
         except (MpcError, OSError) as error:

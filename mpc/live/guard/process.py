@@ -50,6 +50,7 @@ class GuardProcess:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
             raise LiveError("guard", "one guard a site", "another that runs", "end it first") from error
+        self._links: dict[str, Link] = make_links(site)
         modes, held = left_before(site)
         self.guard = Guard(self.rules, modes, held)
         self.log = AuditLog(site.folder, "guard", self.clock.wall())
@@ -59,7 +60,6 @@ class GuardProcess:
              "wall": self.clock.wall(), "mono": self.clock.mono()},
         )  # fmt: skip
         self.mailbox = Mailbox(operator_key(site.folder), self.clock.mono)
-        self._links: dict[str, Link] = {}
         self._results: dict[str, str] = {}
         self._stop = asyncio.Event()
         self._notifier = Notifier(site.file.notify, site.file.name)
@@ -70,7 +70,6 @@ class GuardProcess:
         loop = asyncio.get_running_loop()
         for number in (signal.SIGTERM, signal.SIGINT):
             loop.add_signal_handler(number, self._stop.set)
-        self._links = make_links(self.site)
         for link in self._links.values():
             await link.open()
         server = await serve_socket(self.site.sockets, self.mailbox, lambda: self._status)

@@ -24,7 +24,7 @@ _CHUNK = "7 days"
 #: Key of the lock that lets one process migrate at a time: any number that nobody else takes.
 _LOCK = 2_808_2026
 
-_STAGE = "CREATE TEMP TABLE IF NOT EXISTS stage (name text, seconds double precision, value double precision)"
+_STAGE = "CREATE TEMP TABLE IF NOT EXISTS stage (name text, micros bigint, value double precision)"
 
 
 class Historian:
@@ -129,10 +129,12 @@ class Historian:
             )
             cursor.execute(f"{_STAGE} ON COMMIT DROP")
             with cursor.copy("COPY stage FROM STDIN") as copy:
-                for row in zip(samples.names, samples.seconds.tolist(), samples.values.tolist(), strict=True):
+                micros = np.round(1e6 * samples.seconds).astype(np.int64).tolist()
+                for row in zip(samples.names, micros, samples.values.tolist(), strict=True):
                     copy.write_row(row)
             cursor.execute(
-                "INSERT INTO sample SELECT point.id, to_timestamp(seconds), value FROM stage JOIN point USING (name) "
+                "INSERT INTO sample SELECT point.id, timestamptz 'epoch' + micros * interval '1 microsecond', value "
+                "FROM stage JOIN point USING (name) "
                 "ON CONFLICT DO NOTHING"
             )
             return int(cursor.rowcount)

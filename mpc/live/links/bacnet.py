@@ -30,25 +30,24 @@ class BacnetConnection:
     def __init__(self, link: BacnetLink, points: Mapping[str, tuple[str, Conversion]]) -> None:
         self.link, self.points = link, points
         self._app: Any = None
-        self._alone = False  # whether the device takes single properties only
+        self._device = extra("bacpypes3.local.device", "live", "BACnet")
+        self._application = extra("bacpypes3.ipv4.app", "live", "BACnet")
+        self._pdu = extra("bacpypes3.pdu", "live", "BACnet")
+        self._raised = extra("bacpypes3.apdu", "live", "BACnet").ErrorRejectAbortNack
+        self._null = extra("bacpypes3.primitivedata", "live", "BACnet").Null
 
     async def open(self) -> None:
         """Begin."""
-        device = extra("bacpypes3.local.device", "live", "BACnet")
-        application = extra("bacpypes3.ipv4.app", "live", "BACnet")
-        pdu = extra("bacpypes3.pdu", "live", "BACnet")
         try:
-            own = device.DeviceObject(
+            own = self._device.DeviceObject(
                 objectIdentifier=("device", 4194302), objectName="buildingmpc", vendorIdentifier=999,
                 apduTimeout=max(round(1000 * self.link.timeout / 2), 1), numberOfApduRetries=1,
             )  # fmt: skip
-            self._app = application.NormalApplication(own, pdu.IPv4Address(self.link.local))
-            self._address = pdu.Address(self.link.address)
+            self._app = self._application.NormalApplication(own, self._pdu.IPv4Address(self.link.local))
+            self._address = self._pdu.Address(self.link.address)
         except (ValueError, TypeError, OSError) as error:
             found = f"{self.link.local} and {self.link.address}: {error}"
             raise LiveError("connection of bacnet", "addresses on this machine and of the device", found) from error
-        self._raised = extra("bacpypes3.apdu", "live", "BACnet").ErrorRejectAbortNack
-        self._null = extra("bacpypes3.primitivedata", "live", "BACnet").Null
         await asyncio.sleep(0)
 
     async def read(self, names: Iterable[str], slots: bool) -> dict[str, dict[str, Any]]:
