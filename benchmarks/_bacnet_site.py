@@ -138,6 +138,7 @@ class SimulatedSite:
     slots: list[Slot] = field(default_factory=list)
     now: dict[tuple[int, int], float] = field(default_factory=dict)
     temperatures: dict[str, float] = field(default_factory=dict)
+    commands: dict[tuple[int, int], float] = field(default_factory=dict)
 
     def start(self) -> str:
         """Begin; return the address that clients use, that of the wire."""
@@ -156,6 +157,10 @@ class SimulatedSite:
     def operate(self, point: int, value: float | None, priority: int = 8) -> None:
         """Command a setpoint as an operator does, on the device itself; None takes it back."""
         asyncio.run_coroutine_threadsafe(self._command(point, value, priority), self._loop).result(5.0)
+        if value is None:
+            self.commands.pop((point, priority), None)
+        else:
+            self.commands[point, priority] = value
 
     def held(self, priority: int) -> dict[int, float]:
         """Values of a priority now, by number of the point."""

@@ -103,8 +103,12 @@ def drill(stack: Stack, number: int, name: str, rng: random.Random) -> Drill:
     elif not fault.released:
         _kept(stack, found, fault, begin or time.monotonic())
     commands = {key: value for key, value in stack.building.now.items() if key[1] != 13}
-    operated = {(s.point, s.priority) for s in stack.building.slots if s.priority != 13 and s.time >= (begin or 0.0)}
-    found.overridden += [f"{key} was changed" for key in operated if key not in commands]
+    given = stack.building.commands
+    found.overridden += [
+        f"point {key[0]} at priority {key[1]}: {given.get(key)} became {commands.get(key)}"
+        for key in sorted(set(given) | set(commands))
+        if abs(given.get(key, 1e9) - commands.get(key, -1e9)) > ROUND
+    ]
     healed = fault.heal(stack, rng)
     if fault.healed_first:
         _released(stack, found, healed)
