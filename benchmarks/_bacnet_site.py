@@ -210,7 +210,9 @@ class SimulatedSite:
                 last = time.monotonic()
                 await self._step(passed, rng)
         await server.stop()
-        transport.close()
+        for way in [transport, *self.wire._ways.values()]:
+            way.close()
+        await asyncio.sleep(0)
 
     async def _look(self) -> None:
         """Note what has changed in the priority arrays."""

@@ -191,7 +191,7 @@ def check_samples(stack: Stack) -> tuple[int, int]:
 def run_drills(count: int, seed: int, folder: Path, only: str = "", told: Any = print) -> dict[str, Any]:
     """Run drills of a seed, faults in turn and in an order of the seed."""
     rng, drills = random.Random(seed), list[Drill]()
-    names = [name for name in FAULTS if only in name]
+    names = [name for name in FAULTS if any(part in name for part in only.split(","))]
     order: list[str] = []
     while len(order) < count:
         order += rng.sample(names, len(names))
@@ -262,7 +262,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True, help="folder of the results")
     parser.add_argument("--drills", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--only", default="", help="faults whose names hold this")
+    parser.add_argument("--only", default="", help="faults whose names hold one of these, between commas")
     parser.add_argument("--keep", action="store_true", help="keep logs and outputs of the parts")
     parser.add_argument("--publish", action="store_true")
     options = parser.parse_args()

@@ -39,7 +39,7 @@ def test_a_device_is_read_written_and_given_back(device: Any) -> None:
         await link.open()
         try:
             seen = await link.read(["zone", "set"], slots=True)
-            assert 290.0 < seen["zone"]["value"] < 295.0 or seen["zone"]["error"]  # inputs have no priorities
+            assert seen["zone"]["value"] is None and seen["zone"]["error"]  # inputs have no priorities
             assert seen["set"] == {"value": 293.15, "slots": {}, "error": ""}
             plain = await link.read(["zone"], slots=False)
             assert 290.0 < plain["zone"]["value"] < 295.0 and plain["zone"]["slots"] is None
