@@ -35,6 +35,8 @@ NOT_RUN = {
     "identify": "half a minute; run by tests/mpc/adapters/described/test_identify_command.py",
     "control": "minutes; run by tests/mpc/test_cli_control.py",
     "compare": "minutes; run by tests/mpc/test_cli_control.py",
+    "operate": "until it is interrupted; run by tests/mpc/test_cli_operate.py",
+    "replay": "takes the log of operate; run by tests/mpc/test_cli_operate.py",
     "serve": "until it is interrupted; run by tests/mpc/test_cli_serve.py",
     "label": "until it is interrupted; run by tests/mpc/test_cli_label.py",
     "import-telemetry": "needs a table of one's own; run by tests/mpc/test_cli_import.py",
