@@ -135,6 +135,7 @@ class SimulatedSite:
     frozen: bool = False
     absurd: float | None = None
     outdoor: float | None = None
+    heat: float | None = None
     slots: list[Slot] = field(default_factory=list)
     now: dict[tuple[int, int], float] = field(default_factory=dict)
     temperatures: dict[str, float] = field(default_factory=dict)
@@ -243,7 +244,7 @@ class SimulatedSite:
             rest = OUTDOOR + heat / LOSS
             self.temperatures[zone] = rest + (temperature - rest) * math.exp(-passed * LOSS / CAPACITY)
             shown[k + 2] = self.temperatures[zone] + rng.gauss(0.0, 0.01)
-            shown[k + 4] = heat
+            shown[k + 4] = heat if self.heat is None else self.heat
         if self.absurd is not None:
             shown[2] = self.absurd
         if self.frozen:

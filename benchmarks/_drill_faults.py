@@ -10,7 +10,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from _drill_process import OUTDOOR
 from _drill_stack import RATE, STEP, STUCK, Stack
 
 from mpc.live.clock import set_clock
@@ -193,12 +192,12 @@ def _new_guard(stack: Stack, rng: random.Random) -> Seconds:
     return _start("guard")(stack, rng)
 
 
-def _outdoor(value: float, status: str) -> Callable[[Stack, random.Random], Seconds]:
-    """Have outdoor air at which the controller fails, and wait for its first plan that did."""
+def _input(name: str, value: float, status: str) -> Callable[[Stack, random.Random], Seconds]:
+    """Have an input at which the controller fails, and wait for its first plan that did."""
 
     def make(stack: Stack, rng: random.Random) -> Seconds:
         before = len(stack.events("controller"))
-        stack.building.outdoor = value
+        setattr(stack.building, name, value)
         found: list[float] = []
 
         def failed() -> bool:
@@ -216,7 +215,7 @@ def _outdoor(value: float, status: str) -> Callable[[Stack, random.Random], Seco
 
 
 def _mild(stack: Stack, rng: random.Random) -> None:
-    stack.building.outdoor = None
+    stack.building.outdoor = stack.building.heat = None
 
 
 def _edit(stack: Stack, rng: random.Random) -> Seconds:
@@ -293,11 +292,9 @@ FAULTS: dict[str, Fault] = {
     "database down": Fault(_down, _up),
     "database full": Fault(_fill, _empty),
     "disk of the log full": Fault(_no_disk, _new_guard),
-    "solver fails": Fault(_outdoor(-60.0, "did not converge"), _mild),
-    "plan without numbers": Fault(_outdoor(35.0, "no number"), _mild),
-    "plan out of range": Fault(_outdoor(52.0, "planned"), _mild),
+    "solver fails": Fault(_input("outdoor", -60.0, "did not converge"), _mild),
+    "plan without numbers": Fault(_input("outdoor", 35.0, "no number"), _mild),
+    "plan out of range": Fault(_input("heat", 1e6, "planned"), _mild),
     "configuration edited": Fault(_edit, _guard_too),
     "strangers ask": Fault(_strangers, _nothing, released=False),
 }  # fmt: skip
-
-__all__ = ["FAULTS", "OUTDOOR", "Fault"]

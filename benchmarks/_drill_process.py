@@ -1,4 +1,4 @@
-"""A part of a site in a drill: as in operation, but for a controller that fails on outdoor air of one's choice."""
+"""A part of a site in a drill: as in operation, but for a controller that fails on inputs of one's choice."""
 
 from __future__ import annotations
 
@@ -19,8 +19,11 @@ from mpc.scenario.forecast import Forecast
 SETPOINTS = ("north/zone_air_heating_temperature_setpoint", "south/zone_air_heating_temperature_setpoint")
 OUTDOOR = "weather_station/outside_air_temperature_sensor"
 
-#: Means of outdoor air over a step [K] below, or above, which the solver raises, gives NaN, or a value out of range.
-RAISES, NO_NUMBER, OUT_OF_RANGE = 268.15, 293.15, 318.15
+HEAT = "north/heating_power_sensor"
+
+#: Means over a step below or above which the controller fails: outdoor air at which it raises, or gives NaN [K], and
+#: heat at which it asks for what is out of range [W]; in between the building stays by itself.
+RAISES, NO_NUMBER, OUT_OF_RANGE = 268.15, 293.15, 10_000.0
 
 
 class DrillController:
@@ -32,7 +35,7 @@ class DrillController:
         if outdoor < RAISES:
             raise ControlError("mpc", "a plan", "none: the solver did not converge")
         chosen = {name: round(rng.uniform(291.2, 296.1), 2) for name in SETPOINTS}
-        if outdoor > OUT_OF_RANGE:
+        if measurements[HEAT] > OUT_OF_RANGE:
             return chosen | {SETPOINTS[0]: 400.0}
         return dict.fromkeys(chosen, math.nan) if outdoor > NO_NUMBER else chosen
 
