@@ -159,7 +159,7 @@ def replay(
 
     files = sorted(log.glob("*-[0-9]*.jsonl")) if log.is_dir() else [log]
     LiveError.unless(files, str(log), "files of an audit log", "none")
-    found, before, rows = {}, dict[str, str](), []
+    found, before, rows = dict[str, dict[str, Any]](), dict[str, str](), []
     for path in files:
         name = path.stem.rpartition("-")[0]
         one = replay_log(path, site, before.get(name))

@@ -18,7 +18,8 @@ from mpc.live.historian.recorder import Recorder
 from mpc.live.historian.samples import Samples
 from mpc.live.historian.spool import Spool
 from mpc.live.historian.store import Historian
-from mpc.live.links.link import Link, make_links
+from mpc.live.links.link import Link
+from mpc.live.links.make import make_links
 from mpc.live.site import Site
 from mpc.live.state import write_state
 from mpc.loop.conversion import SIGNAL_UNITS

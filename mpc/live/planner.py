@@ -149,7 +149,7 @@ def forecast_to_dict(forecast: Forecast) -> dict[str, Any]:
     """
     table = forecast.to_frame()
     values = [[None if v != v else v for v in table[column].astype(float).tolist()] for column in table]
-    index = table.index
+    index = pd.DatetimeIndex(table.index)
     return {
         "columns": [str(column) for column in table],
         "seconds": [stamp.timestamp() for stamp in index],

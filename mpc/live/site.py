@@ -94,11 +94,11 @@ class PointEntry(Entry):
     mode : {"shadow", "advise", "act"}
         What is done with what is planned for it.
     range : tuple of float, optional
-        Lowest and highest value that is written [library's unit, or temperatures with theirs].
+        Lowest and highest value that is written [library's unit], or temperatures with their unit.
     rate : float, optional
         Largest change of what is written in an hour [library's unit/h]; 0 lets it change at once, as switches do.
     release : str or float, optional
-        How it is given back: ``relinquish`` (BACnet), or a value that is written then.
+        How it is given back: ``relinquish`` (BACnet), or a value that is written then [library's unit].
     """
 
     connection: Text

@@ -56,7 +56,32 @@ class GuardState:
     modes : dict of str to str
         Of each point.
     giving_back : dict of str to float or None
-        Points to be released until a reading confirms it, with what was last written to each where that is known.
+        Points to be released until a reading confirms it, with what was last written to each where that is known
+        [library's unit].
+    mono, wall : float or None
+        Clocks of the tick before [s].
+    plan : dict or None
+        In force.
+    last_plan : int
+        Number of the last one that was taken [-].
+    plan_since : float
+        Monotonic time at which it was made, by its age when it was received [s].
+    held : dict of str to float
+        Values in force [library's unit].
+    written : dict of str to float
+        Monotonic time of the last order [s].
+    orders : dict of str to float or None
+        Of the tick before; None is a release [library's unit].
+    overridden : dict of str to float
+        Monotonic time at which an operator's command was last seen [s].
+    taken : dict of str to str
+        Points that another program writes to, until an operator sets their mode.
+    approved : dict of str to tuple of float
+        Value [library's unit] and monotonic time of its end [s].
+    still : dict of str to tuple of float
+        Value of an input [library's unit] and since when it has had that [s].
+    nonces : set of str
+        Requests that were used.
     """
 
     modes: dict[str, str]
@@ -65,14 +90,14 @@ class GuardState:
     wall: float = 0.0
     plan: dict[str, Any] | None = None
     last_plan: int = -1
-    plan_since: float = 0.0  # monotonic time at which the plan was made, by its age when it was received
+    plan_since: float = 0.0
     held: dict[str, float] = field(default_factory=dict)
-    written: dict[str, float] = field(default_factory=dict)  # monotonic time of the last write
-    orders: dict[str, float | None] = field(default_factory=dict)  # of the last tick; None is a release
-    overridden: dict[str, float] = field(default_factory=dict)  # monotonic time at which that was last seen
-    taken: dict[str, str] = field(default_factory=dict)  # by another program, until an operator switches the mode
-    approved: dict[str, tuple[float, float]] = field(default_factory=dict)  # value, and until when
-    still: dict[str, tuple[float, float]] = field(default_factory=dict)  # inputs: value, and since when
+    written: dict[str, float] = field(default_factory=dict)
+    orders: dict[str, float | None] = field(default_factory=dict)
+    overridden: dict[str, float] = field(default_factory=dict)
+    taken: dict[str, str] = field(default_factory=dict)
+    approved: dict[str, tuple[float, float]] = field(default_factory=dict)
+    still: dict[str, tuple[float, float]] = field(default_factory=dict)
     nonces: set[str] = field(default_factory=set)
 
 
@@ -86,7 +111,7 @@ class Guard:
     modes : mapping of str to str, optional
         Of points, in the place of the rules' own.
     held_before : mapping of str to float, optional
-        What an earlier guard may have left in force, for connections without priorities.
+        What an earlier guard may have left in force, for connections without priorities [library's unit].
     """
 
     def __init__(
@@ -303,7 +328,7 @@ class Guard:
         begin = min(max(begin, rule.lowest), rule.highest)
         passed = now - state.written[name] if name in state.held and name in state.written else self.rules.limits.tick
         most = rule.rate * max(passed, 0.0) / 3600.0
-        return min(max(target, begin - most), begin + most)
+        return float(min(max(target, begin - most), begin + most))
 
     def _releases(self, tick: Tick) -> list[str]:
         """Points to give back now: all that are not confirmed, and that nobody else has set."""

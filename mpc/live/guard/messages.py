@@ -32,7 +32,7 @@ def check_plan(
     tick : mapping
         Clocks.
     still : dict of str to tuple of float
-        Of each input, its value and since when it has had that; brought up to date.
+        Of each input, its value [library's unit] and since when it has had that [s]; brought up to date.
 
     Returns
     -------

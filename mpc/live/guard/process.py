@@ -17,7 +17,8 @@ from mpc.live.clock import Clock
 from mpc.live.guard.decide import Guard
 from mpc.live.guard.rules import rules_of
 from mpc.live.guard.socket import Mailbox, serve_socket
-from mpc.live.links.link import Link, make_links
+from mpc.live.links.link import Link
+from mpc.live.links.make import make_links
 from mpc.live.notify import Notifier
 from mpc.live.operators import operator_key
 from mpc.live.site import Site

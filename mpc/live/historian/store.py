@@ -92,7 +92,7 @@ class Historian:
                 cursor.execute("INSERT INTO migration VALUES (%s, now())", [version])
             return newest
 
-        found = self._run("migrate", work)
+        found: int = self._run("migrate", work)
         self._run("hypertable", self._chunked)
         return found
 
@@ -139,7 +139,7 @@ class Historian:
             )
             return int(cursor.rowcount)
 
-        return self._run("write", work) if len(samples) else 0
+        return int(self._run("write", work)) if len(samples) else 0
 
     def read(self, columns: Sequence[str], start: pd.Timestamp, end: pd.Timestamp) -> pd.DataFrame:
         """Read samples as a table by time.
@@ -234,7 +234,7 @@ class Historian:
             cursor.execute("DELETE FROM sample WHERE time < %s", [before.floor("us").to_pydatetime()])
             return int(cursor.rowcount)
 
-        return self._run("trim", work)
+        return int(self._run("trim", work))
 
     def _need(self, columns: Sequence[str]) -> None:
         rows = self._run("read", lambda cursor: cursor.execute("SELECT name FROM point").fetchall())
@@ -262,7 +262,7 @@ class Historian:
 
     def _text(self, text: str) -> LiteralString:
         """Hand on SQL that stands in the package, with a schema's name that was checked."""
-        return cast(LiteralString, text)
+        return cast("LiteralString", text)
 
 
 def migrations() -> dict[int, str]:

@@ -109,7 +109,7 @@ class BacnetConnection:
         Parameters
         ----------
         name, value
-            As of `Link`.
+            As of `Link` [library's unit].
         """
         at, line = self.points[name]
         given: Any = self._null(()) if value is None else line.out(value)

@@ -6,8 +6,6 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any, Protocol
 
-from mpc.live.site import BacnetLink, MqttLink, Site
-
 
 def reading(value: float | None, slots: Mapping[str, float] | None = None, error: str = "") -> dict[str, Any]:
     """Give what a point shows, in plain types.
@@ -56,28 +54,3 @@ class Link(Protocol):
 
     async def close(self) -> None:
         """End."""
-
-
-def make_links(site: Site) -> dict[str, Link]:
-    """Make the connections of a site, to be opened, by name.
-
-    Parameters
-    ----------
-    site : Site
-        As read.
-    """
-    from mpc.live.links.bacnet import BacnetConnection
-    from mpc.live.links.mqtt import MqttConnection
-
-    made: dict[str, Link] = {}
-    for name, link in site.file.connections.items():
-        points = {
-            point: (entry.at, site.conversions[point])
-            for point, entry in site.file.points.items()
-            if entry.connection == name
-        }
-        if isinstance(link, BacnetLink):
-            made[name] = BacnetConnection(link, points)
-        elif isinstance(link, MqttLink):
-            made[name] = MqttConnection(link, points, site.path.parent)
-    return made

@@ -37,7 +37,8 @@ class MqttConnection:
     def __init__(self, link: MqttLink, points: Mapping[str, tuple[str, Conversion]], folder: Path) -> None:
         self.link, self.points, self._folder = link, points, folder
         self._seen: dict[str, tuple[float, float]] = {}  # by topic: machine's monotonic time, value
-        self._lock, self._client = threading.Lock(), None
+        self._lock = threading.Lock()
+        self._client: Any = None
 
     async def open(self) -> None:
         """Begin; a broker that is not there yet is tried again and again."""
@@ -60,7 +61,7 @@ class MqttConnection:
         client.reconnect_delay_set(1, 10)
         client.connect_async(self.link.host, self.link.port)
         client.loop_start()
-        self._client: Any = client
+        self._client = client
 
     def _take(self, topic: str, payload: bytes) -> None:
         """Keep a value; what is no number counts as one that is missing."""
@@ -93,7 +94,7 @@ class MqttConnection:
         Parameters
         ----------
         name, value
-            As of `Link`; None is refused, for there is nothing to relinquish.
+            As of `Link` [library's unit]; None is refused, for there is nothing to relinquish.
         """
         at, line = self.points[name]
         read, _, write = at.partition(" ")
