@@ -288,7 +288,7 @@ FAULTS: dict[str, Fault] = {
     "operator overrides the second": Fault(_override(2), _no_override, released=False),
     "network cut": Fault(_cut, _join, healed_first=True),
     "clock jumps ahead": Fault(_jump(3600.0), _nothing),
-    "clock jumps back": Fault(_jump(-3600.0), _nothing),
+    "clock jumps back": Fault(_jump(-1200.0), _nothing),
     "database down": Fault(_down, _up),
     "database full": Fault(_fill, _empty),
     "disk of the log full": Fault(_no_disk, _new_guard),

@@ -98,7 +98,7 @@ class ControlProcess:
         """Say why the measurements of now would not bear a plan."""
         now = self.clock.wall()
         try:
-            known = self.historian.latest(self.zones, now)
+            known = self.historian.latest(self.zones)  # of a clock that was put back, samples of before lie ahead
         except HistorianError as error:
             return f"the historian does not answer: {error}"
         stuck, kind = self.site.limits()["stuck"], POINT_TYPES[ZONE_TEMPERATURE]
@@ -106,6 +106,8 @@ class ControlProcess:
             time, value = known.get(zone, (now, math.nan))
             if not kind.possible(value):
                 return f"{zone} is no number" if value != value else f"{zone} is {kind.told(value)}"
+            if time - now > self.site.limits()["clock_jump"]:
+                return f"{zone} has a sample {time - now:.0f} s ahead of the clock"
             if now - time > oldest:
                 return f"{zone} is {now - time:.0f} s old"
             before, since = self._still.get(zone, (math.nan, time))
@@ -138,7 +140,7 @@ class ControlProcess:
         latest: dict[str, Any] = {}
         now = self.clock.wall()
         try:
-            known = {name: told for name, told in self.historian.latest(list(self.columns), now).items()}
+            known = self.historian.latest(list(self.columns))
             asked = [name for name in self.columns if name in known]
             start, end = (pd.Timestamp(t, unit="s", tz="UTC") for t in (now - self.site.step, now + 1e-3))
             inputs["means"] = {k: _mean(k, v) for k, v in self.historian.read(asked, start, end).items()}

@@ -15,6 +15,7 @@ import yaml
 from mpc.adapters.described.load import load_plant
 from mpc.errors import LiveError, MpcError, PlantError
 from mpc.live.clock import Clock, SimulatedClock, set_clock
+from mpc.live.controller import ControlProcess
 from mpc.live.guard.process import left_before
 from mpc.live.guard.rules import GuardRules, rules_of
 from mpc.live.guard.socket import Mailbox
@@ -158,6 +159,29 @@ def test_plans_repeat_and_a_failure_is_a_status(tmp_path: Path) -> None:
     assert "ZeroDivisionError" in Planner(site, Bad(ZeroDivisionError("x"))).plan(inputs)["status"]
     assert Planner(site, Bad(1.0)).plan(inputs)["other"] == {"boiler/valve": 1.0}
     assert needed_columns(site) == ("north/zone_air_temperature_sensor",)
+
+
+def test_measurements_that_bear_no_plan_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("psycopg", reason="needs the extra [live]")
+    process = ControlProcess(make(tmp_path, {"guard": {"stuck": 600.0}}))
+    zone, now = "north/zone_air_temperature_sensor", [1e9]
+    monkeypatch.setattr(process.clock, "wall", lambda: now[0])
+    told: dict[str, tuple[float, float]] = {}
+    monkeypatch.setattr(process.historian, "latest", lambda columns: told)
+    for seen, says in (
+        ({}, "is no number"), ({zone: (1e9, float("nan"))}, "is no number"), ({zone: (1e9, 423.15)}, "is 150 degC"),
+        ({zone: (1e9 - 200.0, 293.0)}, "is 200 s old"), ({zone: (1e9 + 60.0, 293.0)}, "60 s ahead of the clock"),
+        ({zone: (1e9, 293.0)}, ""),
+    ):  # fmt: skip
+        told.clear()
+        told.update(seen)
+        assert says in process._trouble(180.0) and bool(says) == bool(process._trouble(180.0))
+    now[0] += 660.0
+    told[zone] = (now[0], 293.0)
+    assert "has not moved for 660 s" in process._trouble(180.0)
+    told[zone] = (now[0], 293.1)
+    assert process._trouble(180.0) == ""
+    process.log.close()
 
 
 def test_requests_are_an_operators_or_refused(tmp_path: Path) -> None:
