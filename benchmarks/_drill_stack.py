@@ -99,7 +99,7 @@ class Stack:
         device = self.building.start()
         self.site_path = folder / "site.yaml"
         (folder / "plant.yaml").write_text(PLANT, encoding="utf-8")
-        stamps = pd.date_range(BEGIN - pd.Timedelta("2d"), periods=24 * 60, freq="1h").tz_localize(None)
+        stamps = pd.date_range(BEGIN - pd.Timedelta(days=2), periods=24 * 60, freq="1h").tz_localize(None)
         rows = "".join(f"{stamp:%Y-%m-%d %H:%M},275.15\n" for stamp in stamps)
         (folder / "weather.csv").write_text("timestamp,outdoor\n" + rows, encoding="utf-8")
         self.site_path.write_text(site_text(self.database.address, device), encoding="utf-8")

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from importlib import resources
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, LiteralString, cast
+from typing import TYPE_CHECKING, Any, LiteralString
 
 import numpy as np
 import pandas as pd
@@ -262,7 +262,7 @@ class Historian:
 
     def _text(self, text: str) -> LiteralString:
         """Hand on SQL that stands in the package, with a schema's name that was checked."""
-        return cast("LiteralString", text)
+        return text
 
 
 def migrations() -> dict[int, str]:
