@@ -45,3 +45,11 @@ class BoptestTimeoutError(BoptestError):
 
 class EnergyPlusError(PlantError):
     """EnergyPlus is missing, has no such building, or a run of it failed."""
+
+
+class LiveError(MpcError):
+    """Operation of a building is described wrongly, or a part of it cannot do what it is asked for."""
+
+
+class HistorianError(LiveError):
+    """The historian's database or spool cannot be reached, or is full."""

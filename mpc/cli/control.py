@@ -92,7 +92,7 @@ class StudyOptions:
     @property
     def described(self) -> bool:
         """Whether a described plant is controlled, rather than the building of a case."""
-        from mpc.adapters.described.load import ready_plants
+        from mpc.adapters.described.read import ready_plants
 
         return self.case.suffix in (".yaml", ".yml") or (str(self.case) in ready_plants() and not self.case.exists())
 

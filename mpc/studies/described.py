@@ -11,7 +11,8 @@ from typing import Any
 import pandas as pd
 
 from mpc.adapters.boptest.scenario import PERIOD_DAYS
-from mpc.adapters.described.load import load_plant, period_of, read_description
+from mpc.adapters.described.load import load_plant, period_of
+from mpc.adapters.described.read import read_description
 from mpc.adapters.described.schema import PlantFile
 from mpc.adapters.described.seen import seen_scenario
 from mpc.baselines.plants import FullSpeed

@@ -6,13 +6,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pandas as pd
-from pydantic import ValidationError
 
 from mpc.adapters.boptest.mapping import BoptestSignals
 from mpc.adapters.boptest.plant import BoptestPlant, BoptestSettings, BoptestTime
 from mpc.adapters.boptest.scenario import DAY, PRICE_POINTS, YearClock
 from mpc.adapters.described.conditions import SeriesSource, described_forecaster
-from mpc.adapters.described.schema import EnergyPlusProgram, Period, PlantFile, ServerProgram, UnitProgram, Value
+from mpc.adapters.described.programs import EnergyPlusProgram, ServerProgram, SiteProgram, UnitProgram
+from mpc.adapters.described.read import place_of, read_description
+from mpc.adapters.described.schema import Period, PlantFile, Value
 from mpc.adapters.described.series import NamedSeries, read_table, run_ahead, unit_period, unit_tables
 from mpc.adapters.energyplus.input import building_path, weather_path
 from mpc.adapters.energyplus.signals import EnergyPlusRun, EnergyPlusSignalPlant, EnergyPlusSignals
@@ -20,11 +21,7 @@ from mpc.adapters.fmu.plant import FmuPlant, FmuSignals, FmuTime
 from mpc.adapters.fmu.unit import Unit
 from mpc.errors import PlantError
 from mpc.scenario.grid import StepGrid
-from thermal.case.schema_file import read_mapping, schema_error
 from thermal.case.years import EXPECTED, within_years
-
-#: Descriptions that the library brings: test cases of BOPTEST by name.
-READY = Path(__file__).parent / "cases"
 
 
 class _Span(NamedTuple):
@@ -33,17 +30,6 @@ class _Span(NamedTuple):
     start: float
     duration: float
     warm_up: float
-
-
-def ready_plants() -> tuple[str, ...]:
-    """Name the descriptions that the library brings.
-
-    Examples
-    --------
-    >>> "bestest_hydronic_heat_pump" in ready_plants()
-    True
-    """
-    return tuple(sorted(path.stem for path in READY.glob("*.yaml")))
 
 
 def load_plant(
@@ -74,35 +60,15 @@ def load_plant(
     --------
     >>> plant = load_plant("bestest_hydronic_heat_pump", at="http://127.0.0.1:5000")  # doctest: +SKIP
     """
-    parsed, place = read_description(path, at=at, changes=changes), _place(path)
+    parsed, place = read_description(path, at=at, changes=changes), place_of(path)
     if isinstance(parsed.plant, ServerProgram):
         return _server_plant(parsed, parsed.plant)
+    if isinstance(parsed.plant, SiteProgram):
+        advice = "run it with: buildingmpc operate site.yaml"
+        raise PlantError("plant.kind", "a program that stands for the building", "'site', a real one", advice)
     if isinstance(parsed.plant, EnergyPlusProgram):
         return _energyplus(parsed, parsed.plant, place.parent)
     return _unit_plant(parsed, parsed.plant, place.parent)
-
-
-def read_description(
-    path: str | Path, *, at: str | Path | None = None, changes: Mapping[str, Any] | None = None
-) -> PlantFile:
-    """Read a description without making its plant.
-
-    Parameters
-    ----------
-    path, at, changes
-        As of `load_plant`.
-
-    Raises
-    ------
-    PlantError
-        When it does not fit its schema.
-    """
-    given = dict(changes or {})
-    if at is not None:
-        server = str(at).startswith(("http://", "https://"))
-        file = None if server else str(Path(at).resolve())
-        given["plant"] = {"kind": "boptest", "url": str(at)} if server else {"kind": "fmu", "file": file}
-    return _read(_place(path), given)
 
 
 def period_of(path: str | Path, file: PlantFile) -> tuple[pd.Timestamp, float]:
@@ -123,31 +89,12 @@ def period_of(path: str | Path, file: PlantFile) -> tuple[pd.Timestamp, float]:
     if isinstance(file.period, Period):
         clock, span = _span(file.period, file.location.timezone)
     elif isinstance(file.plant, UnitProgram):
-        unit = _place(path).parent / file.plant.file
+        unit = place_of(path).parent / file.plant.file
         clock, span = YearClock(file.year, file.location.timezone), _Span(*unit_period(unit, file.period))
     else:
         found = f"{file.period!r}, which a server knows"
         raise PlantError("period", "its start and days", found, "give --start and --end")
     return clock.stamp(span.start), span.duration / DAY
-
-
-def _place(path: str | Path) -> Path:
-    return READY / f"{path}.yaml" if str(path) in ready_plants() else Path(path)
-
-
-def _read(place: Path, changes: Mapping[str, Any] | None) -> PlantFile:
-    known = f"a description of a plant, or one of {', '.join(ready_plants())}"
-    content = read_mapping(place, PlantError, place.name, known) | dict(changes or {})
-    try:
-        parsed = PlantFile.model_validate(content)
-    except ValidationError as error:
-        raise schema_error(error, PlantError, place.name, PlantFile) from error
-    try:
-        pd.Timestamp(2023, 1, 1, tz=parsed.location.timezone)
-    except (KeyError, ValueError, OSError) as error:
-        found = repr(parsed.location.timezone)
-        raise PlantError(f"{place.name}: location.timezone", "an IANA name", found) from error
-    return parsed
 
 
 def _mappings(file: PlantFile) -> dict[str, Any]:

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
+from mpc.adapters.described.programs import EnergyPlusProgram, ServerProgram, SiteProgram, UnitProgram
 from thermal.case.building import Entry, Location, Number, Positive, Text
 from thermal.errors import CaseError
 from thermal.units import to_si
@@ -261,72 +262,6 @@ class Period(Entry):
     warm_up_days: Annotated[Number, Field(ge=0, le=366)] = 0.0
 
 
-class UnitProgram(Entry):
-    """A functional mock-up unit.
-
-    Parameters
-    ----------
-    kind : str
-        ``fmu``.
-    file : str
-        The ``.fmu``, relative to the description.
-    interface : {"co-simulation", "model exchange"}, optional
-        How it is run; model exchange by default, where the unit has it.
-    parameters : mapping of str to float
-        Of the unit, start values and inputs that are held [their declared units].
-    communication_step : float
-        Longest time between two readings [s], a millisecond or more.
-    """
-
-    kind: Literal["fmu"]
-    file: Text
-    interface: Literal["co-simulation", "model exchange"] | None = None
-    parameters: dict[Text, Number] = Field(default_factory=dict)
-    communication_step: Annotated[Number, Field(ge=1e-3)] = 30.0
-
-
-class ServerProgram(Entry):
-    """A test case of a BOPTEST server.
-
-    Parameters
-    ----------
-    kind : str
-        ``boptest``.
-    url : str
-        Of the server.
-    testcase : str, optional
-        Its name there; that of the plant by default.
-    timeout : float
-        How long to wait for an answer [s].
-    """
-
-    kind: Literal["boptest"]
-    url: Text
-    testcase: Text | None = None
-    timeout: Positive = 600.0
-
-
-class EnergyPlusProgram(Entry):
-    """A building of EnergyPlus.
-
-    Parameters
-    ----------
-    kind : str
-        ``energyplus``.
-    model : str
-        An ``.idf`` or ``.epJSON`` file relative to the description, or one of EnergyPlus' reference buildings.
-    weather : str
-        An ``.epw`` file relative to the description, or one that EnergyPlus brings.
-    steps_per_hour : int
-        Of zones and weather, a divisor of 60.
-    """
-
-    kind: Literal["energyplus"]
-    model: Text
-    weather: Text
-    steps_per_hour: Annotated[int, Field(ge=1, le=60, strict=True)] = 12
-
-
 class PlantFile(Entry):
     """A ``plant.yaml``.
 
@@ -342,7 +277,7 @@ class PlantFile(Entry):
         Where it stands; its time zone is that of all times.
     year : int
         That seconds of the year, and periods by name, belong to.
-    plant : UnitProgram, ServerProgram or EnergyPlusProgram
+    plant : UnitProgram, ServerProgram, EnergyPlusProgram or SiteProgram
         What stands for the building.
     control_step : float
         Time between two actions, a second or more [s].
@@ -374,7 +309,7 @@ class PlantFile(Entry):
     about: str = ""
     location: Location
     year: Annotated[int, Field(ge=1900, le=2200, strict=True)] = 2023
-    plant: Annotated[UnitProgram | ServerProgram | EnergyPlusProgram, Field(discriminator="kind")]
+    plant: Annotated[UnitProgram | ServerProgram | EnergyPlusProgram | SiteProgram, Field(discriminator="kind")]
     control_step: Annotated[Number, Field(ge=1)]
     period: Annotated[
         Annotated[Text, Tag("<name>")] | Annotated[Period, Tag("<period>")],

@@ -14,7 +14,8 @@ import pytest
 import yaml
 
 from mpc.adapters.boptest.scenario import YearClock
-from mpc.adapters.described.load import READY, _mappings, _span, load_plant, ready_plants
+from mpc.adapters.described.load import _mappings, _span, load_plant
+from mpc.adapters.described.read import READY, ready_plants
 from mpc.adapters.described.schema import Period, PlantFile
 from mpc.adapters.described.series import NamedSeries, read_table, unit_period
 from mpc.adapters.fmu.plant import FmuSignals
@@ -232,7 +233,7 @@ EDITS: list[tuple[dict[str, Any], str]] = [
     ({"series": ["unit"]}, "expected tables in its resources, as BOPTEST's units, found none"),
     ({"series": ["none.csv"]}, "series none.csv: expected a .csv file, found no such file"),
     ({"plant": {"kind": "fmu", "file": "none.fmu"}}, "plant.file none.fmu: expected a functional mock-up unit"),
-    ({"plant": {"kind": "tmu", "file": "house.fmu"}}, "plant.yaml: plant.kind: expected one of 'fmu', 'boptest', 'energyplus', found 'tmu'"),
+    ({"plant": {"kind": "tmu", "file": "house.fmu"}}, "plant.yaml: plant.kind: expected one of 'fmu', 'boptest', 'energyplus', 'site', found 'tmu'"),
     ({"plant": {"kind": "boptest", "url": "http://127.0.0.1:9"}}, "prices.electricity: expected one of PriceElec"),
     ({"location": {"latitude": 0, "longitude": 0, "elevation": 0, "timezone": "Mars"}}, "location.timezone"),
 ]  # fmt: skip

@@ -1,0 +1,178 @@
+"""``buildingmpc operate`` and ``buildingmpc replay``."""
+
+from __future__ import annotations
+
+import getpass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from mpc.cli.console import answer, complain, say, show_table
+from mpc.cli.options import Json, file, ids, value
+from mpc.errors import LiveError
+
+if TYPE_CHECKING:
+    from mpc.live.site import Site
+
+_PARTS = ("guard", "collector", "controller", "page")
+
+
+def operate(
+    site: Annotated[Path, typer.Argument(metavar="SITE", help="site.yaml.")],
+    part: Annotated[
+        str | None, value(f"Run one of {', '.join(_PARTS)} alone, in this process; default: all.", "PART")
+    ] = None,
+    check: Annotated[bool, typer.Option("--check", help="Read the files, say what they ask for, and end.")] = False,
+    status: Annotated[bool, typer.Option("--status", help="Say what the guard of a running site does.")] = False,
+    approve: Annotated[
+        str, value("Approve the values of advised points in the plan that is in force; 'all' for all.", "POINT,...")
+    ] = "",
+    mode: Annotated[
+        str, value("Switch points to shadow, advise or act: MODE, or MODE:POINT,...", "MODE[:POINT,...]")
+    ] = "",
+    json: Json = False,
+) -> int:
+    """Operate a real building: shadow, advise or act on the points of a site.yaml.
+
+    Example: buildingmpc operate site.yaml
+    """
+    from mpc.live.site import Site
+
+    read = Site(site)
+    if check:
+        return _check(read, json)
+    if status:
+        return _status(read, json)
+    if approve or mode:
+        return _ask(read, approve, mode, json)
+    if part is not None:
+        LiveError.unless_known(part, _PARTS, "--part", f"one of {', '.join(_PARTS)}")
+        return _run(read, part)
+    from mpc.live.supervise import Supervisor
+
+    if not json:
+        say(f"Operating {read.file.name}; page: http://{read.file.page.host}:{read.file.page.port}   Ctrl-C ends it")
+        say(f"Logs: {read.folder}")
+    return Supervisor(site, read.folder).run()
+
+
+def _run(site: Site, part: str) -> int:
+    if part == "guard":
+        from mpc.live.guard.process import run_guard
+
+        return run_guard(site)
+    if part == "collector":
+        from mpc.live.collector import run_collector
+
+        return run_collector(site)
+    if part == "controller":
+        from mpc.live.controller import run_controller_process
+
+        return run_controller_process(site)
+    from mpc.live.page.serve import run_page
+
+    return run_page(site)
+
+
+def _check(site: Site, json: bool) -> int:
+    from mpc.live.planner import Planner
+
+    Planner(site)  # says what is wrong with model and plant
+    rows = [
+        (name, entry.connection, entry.at, entry.mode if name in site.writable else "read")
+        for name, entry in site.file.points.items()
+    ]
+    content = {
+        "name": site.file.name, "configuration": site.hash, "controller": site.file.controller, "step": site.step,
+        "limits": site.limits(), "points": {name: mode for name, _, _, mode in rows},
+    }  # fmt: skip
+
+    def show() -> None:
+        show_table(f"Points of {site.file.name}", dict.fromkeys(("point", "connection", "at", "mode"), ""), rows)
+
+    return answer(json, content, show)
+
+
+def _guard(site: Site) -> dict[str, Any]:
+    from mpc.live.guard.socket import GuardClient
+
+    client = GuardClient(site.sockets)
+    told = client.ask({"kind": "status"})
+    client.close()
+    LiveError.unless("decision" in told, "guard", "a guard that runs", told.get("error", "none"), "start it: operate")
+    return told
+
+
+def _status(site: Site, json: bool) -> int:
+    told = _guard(site)
+    decision = told["decision"]
+    rows = [
+        (name, decision["modes"][name], decision["held"].get(name), decision["why"].get(name, ""))
+        for name in decision["modes"]
+    ]
+
+    def show() -> None:
+        show_table(site.file.name, {"point": "", "mode": "", "in force": "g", "why not": ""}, rows)
+        for doubt in decision["doubts"]:
+            say(f"Doubt: {doubt}.")
+
+    return answer(json, told, show)
+
+
+def _ask(site: Site, approve: str, mode: str, json: bool) -> int:
+    """Send an operator's request, signed with the key of the site's folder."""
+    from mpc.live.guard.socket import GuardClient
+    from mpc.live.operators import operator_key, sign
+
+    told = _guard(site)
+    request: dict[str, Any]
+    if approve:
+        plan = told["plan"]
+        LiveError.unless(plan is not None, "--approve", "a plan that is in force", "none")
+        modes = told["decision"]["modes"]
+        points = [n for n in plan["values"] if modes.get(n) == "advise"] if approve == "all" else list(ids(approve))
+        request = {"kind": "approve", "points": points, "plan": plan["number"]}
+    else:
+        name, _, listed = mode.partition(":")
+        request = {"kind": "mode", "mode": name, "points": list(ids(listed)) or list(told["decision"]["modes"])}
+    client = GuardClient(site.sockets)
+    signed = sign(request, operator_key(site.folder), float(told["wall"]), getpass.getuser())
+    error = client.ask(signed)["error"]
+    client.close()
+    if error:
+        complain(f"error: {error}")
+        return 1
+    return answer(json, request, lambda: say("The guard has the request; --status says what it made of it."))
+
+
+def replay(
+    log: Annotated[Path, typer.Argument(metavar="LOG", help="A file of an audit log, or the folder of all.")],
+    site: Annotated[Path | None, file("site.yaml of that time, to repeat the plans of the controller too.")] = None,
+    json: Json = False,
+) -> int:
+    """Repeat every decision of an audit log bit for bit, and check the chain of its lines.
+
+    Example: buildingmpc replay live/guard-000000.jsonl
+    """
+    from mpc.live.replay import replay_log
+
+    files = sorted(log.glob("*-[0-9]*.jsonl")) if log.is_dir() else [log]
+    LiveError.unless(files, str(log), "files of an audit log", "none")
+    found, before, rows = dict[str, dict[str, Any]](), dict[str, str](), []
+    for path in files:
+        name = path.stem.rpartition("-")[0]
+        one = replay_log(path, site, before.get(name))
+        if one.last:
+            before[name] = one.last
+        found[path.name] = {"lines": one.lines, "decisions": one.decisions, "broken": one.broken,
+                            "different": one.different, "notes": one.notes, "last": one.last}  # fmt: skip
+        rows.append((path.name, one.lines, one.decisions, one.broken or "; ".join(one.different[:3]) or "repeats"))
+
+    def show() -> None:
+        show_table("Replay", {"file": "", "lines": "d", "decisions": "d", "result": ""}, rows)
+        for note in {note for one in found.values() for note in one["notes"]}:
+            say(f"Note: {note}.")
+
+    answer(json, found, show)
+    return 0 if all(not one["broken"] and not one["different"] for one in found.values()) else 1

@@ -1,0 +1,209 @@
+"""The guard's process: looks, decides, writes the decision down, and only then writes to the building."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import fcntl
+import json
+import os
+import signal
+from collections.abc import Mapping
+from typing import Any
+
+from mpc.errors import LiveError
+from mpc.live.audit import AuditLog, code_version, log_files
+from mpc.live.clock import Clock
+from mpc.live.guard.decide import Guard
+from mpc.live.guard.rules import rules_of
+from mpc.live.guard.socket import Mailbox, serve_socket
+from mpc.live.links.link import Link
+from mpc.live.links.make import make_links
+from mpc.live.notify import Notifier
+from mpc.live.operators import operator_key
+from mpc.live.site import Site
+
+#: Ticks that the end of the guard takes at most, so that releases are seen to have been done.
+_LAST_TICKS = 5
+
+
+class GuardProcess:
+    """Runs a site's guard.
+
+    Parameters
+    ----------
+    site : Site
+        As read.
+    clock : Clock, optional
+        The site's by default.
+
+    Raises
+    ------
+    LiveError
+        When another guard of the site runs.
+    """
+
+    def __init__(self, site: Site, clock: Clock | None = None) -> None:
+        self.site, self.clock = site, clock or site.clock()
+        self.rules = rules_of(site)
+        self._lock = os.open(site.folder / "guard.lock", os.O_CREAT | os.O_RDWR, 0o600)
+        try:
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            raise LiveError("guard", "one guard a site", "another that runs", "end it first") from error
+        self._links: dict[str, Link] = make_links(site)
+        modes, held = left_before(site)
+        self.guard = Guard(self.rules, modes, held)
+        self.log = AuditLog(site.folder, "guard", self.clock.wall())
+        self.log.append(
+            "start",
+            {"code": code_version(), "rules": self.rules.to_dict(), "modes": modes, "held_before": held,
+             "wall": self.clock.wall(), "mono": self.clock.mono()},
+        )  # fmt: skip
+        self.mailbox = Mailbox(operator_key(site.folder), self.clock.mono)
+        self._results: dict[str, str] = {}
+        self._stop = asyncio.Event()
+        self._notifier = Notifier(site.file.notify, site.file.name)
+        self._status: dict[str, Any] = {}
+
+    async def run(self) -> int:
+        """Guard until it is ended; return the exit code."""
+        loop = asyncio.get_running_loop()
+        for number in (signal.SIGTERM, signal.SIGINT):
+            loop.add_signal_handler(number, self._stop.set)
+        for link in self._links.values():
+            await link.open()
+        server = await serve_socket(self.site.sockets, self.mailbox, lambda: self._status)
+        try:
+            return await self._watch()
+        except LiveError as error:  # the log cannot be written: nothing may be, but to give everything back
+            for _ in range(2):
+                await self._order({}, list(self.rules.points))
+            self._notifier.tell([f"the guard ends: {error}"], self.clock.wall())
+            return 1
+        finally:
+            server.close()
+            for link in self._links.values():
+                await link.close()
+            self.log.close()
+            os.close(self._lock)
+
+    async def _watch(self) -> int:
+        """Tick until the end, and on until everything is seen to be given back."""
+        left = _LAST_TICKS
+        while True:
+            begin = self.clock.mono()
+            stopping = self._stop.is_set()
+            decision = await self.tick(stopping)
+            if stopping:
+                left -= 1
+                if not decision["giving_back"] or not left:
+                    return 0
+            wait = self.clock.real(self.rules.limits.tick - (self.clock.mono() - begin))
+            if stopping:
+                await asyncio.sleep(min(max(wait, 0.0), 0.2))
+                continue
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(self._stop.wait(), max(wait, 0.0))
+
+    async def tick(self, stopping: bool = False) -> dict[str, Any]:
+        """Look, decide, write down, order; return the decision.
+
+        Parameters
+        ----------
+        stopping : bool
+            Whether the guard is being ended.
+        """
+        readings = await self._read()
+        tick = {
+            "mono": self.clock.mono(), "wall": self.clock.wall(), "beat": self.mailbox.beat, "stopping": stopping,
+            "messages": self.mailbox.empty(), "readings": readings, "results": self._results,
+        }  # fmt: skip
+        tick = json.loads(json.dumps(tick))  # what is decided on is what the log will say
+        decision = self.guard.decide(tick)
+        digest = self.log.append("tick", {"tick": tick, "decision": decision})
+        self._results = await self._order(decision["writes"], decision["releases"])
+        plan = self.guard.state.plan
+        self._status = {
+            "site": self.site.file.name, "wall": tick["wall"], "configuration": self.rules.configuration,
+            "decision": decision, "readings": readings, "plan": plan, "log": digest, "code": code_version(),
+            "dropped": self.mailbox.dropped, "orders": self._results,
+            "overridden": sorted(self.guard.state.overridden), "taken": dict(self.guard.state.taken),
+        }  # fmt: skip
+        self._notifier.tell(decision["doubts"], tick["wall"])
+        return decision
+
+    async def _read(self) -> dict[str, dict[str, Any]]:
+        """Read what may be written, of all connections at a time."""
+
+        async def of(name: str) -> dict[str, dict[str, Any]]:
+            points = [p for p in self.rules.points if self.site.file.points[p].connection == name]
+            return await self._links[name].read(points, slots=True) if points else {}
+
+        found = await asyncio.gather(*(of(name) for name in self._links))
+        return {point: reading for part in found for point, reading in part.items()}
+
+    async def _order(self, writes: Mapping[str, float], releases: list[str]) -> dict[str, str]:
+        """Write and give back; say by point what became of it."""
+
+        async def one(point: str, value: float | None) -> str:
+            rule = self.rules.points[point]
+            given = rule.release if value is None and isinstance(rule.release, float) else value
+            link = self._links[self.site.file.points[point].connection]
+            try:
+                return await link.write(point, given)
+            except Exception as error:  # whatever a library does, the other points are still to be given back
+                return f"{type(error).__name__}: {error}"[:120]
+
+        orders = {**dict.fromkeys(releases), **writes}
+        errors = await asyncio.gather(*(one(point, value) for point, value in orders.items()))
+        return dict(zip(orders, errors, strict=True))
+
+
+def left_before(site: Site) -> tuple[dict[str, str], dict[str, float]]:
+    """Find what an earlier guard left: modes that operators chose, and what it may have left in force.
+
+    Modes hold on for the same configuration only: who edits the site decides anew.
+
+    Parameters
+    ----------
+    site : Site
+        As read.
+    """
+    for path in reversed(log_files(site.folder, "guard")):
+        start, last = None, None
+        for line in path.read_bytes().splitlines():
+            with contextlib.suppress(ValueError, TypeError, KeyError):
+                entry = json.loads(line)
+                if entry["kind"] == "start":
+                    start = entry["content"]
+                else:
+                    last = entry["content"]["decision"]
+        if start is None:
+            continue
+        held: dict[str, float] = dict(start["held_before"]) if last is None else {}
+        modes: dict[str, str] = start["modes"] if last is None else last["modes"]
+        if last is not None:
+            held = {**last["held"], **last["writes"]}
+        known = {name: float(value) for name, value in held.items() if name in site.writable}
+        if start["rules"]["configuration"] != site.hash:
+            modes = {}
+        return {name: mode for name, mode in modes.items() if name in site.writable}, known
+    return {}, {}
+
+
+def run_guard(site: Site, clock: Clock | None = None) -> int:
+    """Guard a site until the process is ended; return the exit code.
+
+    Parameters
+    ----------
+    site : Site
+        As read.
+    clock : Clock, optional
+        The site's by default.
+    """
+
+    async def main() -> int:
+        return await GuardProcess(site, clock).run()
+
+    return asyncio.run(main())

@@ -1,0 +1,1 @@
+"""Connections to a building: BACnet/IP and MQTT."""

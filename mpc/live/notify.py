@@ -1,0 +1,79 @@
+"""Alarms by mail and webhook: each once, when it begins."""
+
+from __future__ import annotations
+
+import json
+import re
+import smtplib
+import threading
+import urllib.request
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from email.message import EmailMessage
+
+from mpc.live.site import NotifyEntry
+
+#: Longest wait for a server [s].
+_PATIENCE = 10.0
+
+#: Numbers of an alarm that change while it lasts.
+_NUMBERS = re.compile(r"[-+]?\d+(\.\d+)?")
+
+
+class Notifier:
+    """Tells people what is new; a server that does not answer delays nobody.
+
+    Parameters
+    ----------
+    entry : NotifyEntry
+        Who is told.
+    site : str
+        Name of the site.
+
+    Attributes
+    ----------
+    trouble : str
+        Why the last could not be sent; empty where it was.
+    """
+
+    def __init__(self, entry: NotifyEntry, site: str) -> None:
+        self.entry, self.site, self.trouble = entry, site, ""
+        self._known: set[str] = set()
+
+    def tell(self, alarms: Sequence[str], wall: float) -> list[str]:
+        """Send those that were not there the time before; return them.
+
+        Parameters
+        ----------
+        alarms : sequence of str
+            All that there are now.
+        wall : float
+            Wall clock, since 1970 in UTC [s].
+        """
+        kinds = {_NUMBERS.sub("#", alarm): alarm for alarm in alarms}
+        fresh = [alarm for kind, alarm in kinds.items() if kind not in self._known]
+        self._known = set(kinds)
+        if fresh and (self.entry.webhook or self.entry.mail):
+            threading.Thread(target=self._send, args=(fresh, wall), daemon=True).start()
+        return fresh
+
+    def _send(self, alarms: Sequence[str], wall: float) -> None:
+        time = datetime.fromtimestamp(wall, UTC).isoformat(timespec="seconds")
+        try:
+            if self.entry.webhook:
+                body = json.dumps({"site": self.site, "time": time, "alarms": list(alarms)}).encode()
+                request = urllib.request.Request(
+                    self.entry.webhook, body, {"Content-Type": "application/json"}, method="POST"
+                )
+                urllib.request.urlopen(request, timeout=_PATIENCE).close()
+            if self.entry.mail:
+                message = EmailMessage()
+                message["Subject"] = f"buildingmpc {self.site}: {alarms[0]}"[:150].replace("\n", " ")
+                message["To"] = message["From"] = self.entry.mail
+                message.set_content("\n".join([time, *alarms]))
+                host, _, port = self.entry.smtp.partition(":")
+                with smtplib.SMTP(host, int(port or 25), timeout=_PATIENCE) as server:
+                    server.send_message(message)
+            self.trouble = ""
+        except (OSError, smtplib.SMTPException, ValueError) as error:
+            self.trouble = str(error)

@@ -1,0 +1,32 @@
+"""The page's process."""
+
+from __future__ import annotations
+
+from mpc.live.page.access import page_tokens
+from mpc.live.page.app import make_app
+from mpc.live.site import Site
+from mpc.live.state import write_state
+from thermal.plan.guard import extra
+
+#: Connections at a time; more are told to come back.
+_MOST = 100
+
+
+def run_page(site: Site) -> int:
+    """Serve a site's page until the process is ended; return the exit code.
+
+    Parameters
+    ----------
+    site : Site
+        As read.
+    """
+    uvicorn, entry = extra("uvicorn", "live", "the page"), site.file.page
+    tokens = page_tokens(site.folder)
+    address = f"http://{entry.host}:{entry.port}/#"
+    write_state(site.folder / "page.json", {role: address + token for role, token in tokens.items()})
+    (site.folder / "page.json").chmod(0o600)
+    uvicorn.run(
+        make_app(site), host=entry.host, port=entry.port, log_level="warning", limit_concurrency=_MOST,
+        timeout_graceful_shutdown=1,
+    )  # fmt: skip
+    return 0

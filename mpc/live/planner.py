@@ -1,0 +1,187 @@
+"""Plans of a site: what was measured and is forecast in, values of points out; the same in operation and replay."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from mpc.baselines.plants import FullSpeed
+from mpc.control.identified.controller import IdentifiedController, PlannedAction
+from mpc.errors import LiveError, MpcError
+from mpc.identify.machines import find_machines
+from mpc.identify.model import read_model
+from mpc.live.site import Site
+from mpc.loop.actuators import Actuator
+from mpc.loop.conversion import SIGNAL_UNITS
+from mpc.loop.plant import Controller, Measurements, PointLayout
+from mpc.scenario.forecast import Forecast
+from thermal.case.points import OUTDOOR_TEMPERATURE, POINT_TYPES
+
+
+def site_actuators(site: Site) -> tuple[Actuator, ...]:
+    """List what a site's controller plans for, with the ranges of the site where it has them.
+
+    Parameters
+    ----------
+    site : Site
+        As read.
+    """
+    found = []
+    for name, entry in site.plant.actuators.items():
+        point = site.file.points.get(name)
+        ends = (point.range if point is not None else None) or entry.range
+        if ends is None:
+            raise LiveError(f"actuator {name}", "a range, here or in the plant's description", "none")
+        kind = POINT_TYPES.get(name.rpartition("/")[2])
+        unit = "1" if kind is None else SIGNAL_UNITS[kind.quantity]
+        found.append(Actuator(name, unit, *ends, False, entry.kind or "continuous", entry.minimum))
+    return tuple(found)
+
+
+def site_controller(site: Site) -> Controller:
+    """Make the controller that a site names.
+
+    Parameters
+    ----------
+    site : Site
+        As read.
+
+    Raises
+    ------
+    LiveError
+        When its model is of another control step.
+    """
+    actuators = site_actuators(site)
+    if site.file.controller == "full_speed" or site.model_path is None:
+        return FullSpeed(find_machines(actuators, tuple(site.file.points), tuple(site.plant.zones)))
+    model = read_model(site.model_path)
+    LiveError.unless(
+        abs(model.step - site.step) < 1e-6, f"{site.path.name}: model", f"steps of {site.step:g} s, those of the plant",
+        f"{model.step:g} s", "identify the plant anew",
+    )  # fmt: skip
+    return IdentifiedController(model, actuators, site.plant.location)
+
+
+class Planner:
+    """Makes plans of recorded inputs.
+
+    Parameters
+    ----------
+    site : Site
+        As read.
+    controller : Controller, optional
+        In the place of the site's own.
+    """
+
+    def __init__(self, site: Site, controller: Controller | None = None) -> None:
+        self.site = site
+        self.controller = controller or site_controller(site)
+        self._layout = PointLayout(tuple(site.file.points), site.plant.location.timezone)
+
+    def plan(self, inputs: Mapping[str, Any]) -> dict[str, Any]:
+        """Plan a step.
+
+        Parameters
+        ----------
+        inputs : mapping
+            ``begin`` of the step [s], ``means`` of the step that has ended by column (None is missing) [library's
+            units], ``forecast`` of `forecast_to_dict`, or ``trouble``: why there is nothing to plan on.
+
+        Returns
+        -------
+        dict
+            ``status`` (``planned``, or why there is none), ``values`` of points that may be written, ``other`` of those
+            that may not, ``reasons``, ``ahead``: what is expected, and ``expects``.
+        """
+        if inputs["trouble"]:
+            return no_plan(inputs["trouble"])
+        seen = [math.nan if inputs["means"].get(c) is None else inputs["means"][c] for c in self._layout.columns]
+        measured = Measurements(self._layout, round(inputs["begin"]), np.array(seen))
+        try:
+            action = self.controller.step(measured, forecast_of_dict(inputs["forecast"]))
+        except (MpcError, ArithmeticError, ValueError, KeyError, IndexError) as error:
+            return no_plan(f"no plan: {type(error).__name__}: {error}")
+        if isinstance(action, PlannedAction) and action.solution is None:
+            return no_plan("no plan: " + ", ".join(action.reasons))
+        values = {name: float(value) for name, value in action.items()}
+        if not all(math.isfinite(value) for value in values.values()):
+            return no_plan("no plan: a value is no number")
+        allowed = self.site.writable
+        return {
+            "status": "planned",
+            "values": {name: value for name, value in values.items() if name in allowed},
+            "other": {name: value for name, value in values.items() if name not in allowed},
+            "reasons": list(getattr(action, "reasons", ())),
+            "ahead": _expected(action),
+        }
+
+
+def no_plan(why: str) -> dict[str, Any]:
+    """Say that there is nothing to follow.
+
+    Parameters
+    ----------
+    why : str
+        The reason.
+    """
+    return {"status": " ".join(why.split())[:200], "values": {}, "other": {}, "reasons": [], "ahead": None}
+
+
+def _expected(action: Any) -> dict[str, Any] | None:
+    """Temperatures and powers that a plan expects, for the page."""
+    zone, power = getattr(action, "zone", None), getattr(action, "power", None)
+    if zone is None or power is None or not np.isfinite(zone).all() or not np.isfinite(power).all():
+        return None
+    return {"step": float(action.step), "zone": zone.tolist(), "power": power.tolist()}
+
+
+def forecast_to_dict(forecast: Forecast) -> dict[str, Any]:
+    """Give a forecast in plain types, of which `forecast_of_dict` makes the same bits.
+
+    Parameters
+    ----------
+    forecast : Forecast
+        Of a step.
+    """
+    table = forecast.to_frame()
+    values = [[None if v != v else v for v in table[column].astype(float).tolist()] for column in table]
+    index = pd.DatetimeIndex(table.index)
+    return {
+        "columns": [str(column) for column in table],
+        "seconds": [stamp.timestamp() for stamp in index],
+        "timezone": str(index.tz),
+        "values": values,
+    }
+
+
+def forecast_of_dict(content: Mapping[str, Any]) -> Forecast:
+    """Make of what `forecast_to_dict` gave.
+
+    Parameters
+    ----------
+    content : mapping
+        Plain types.
+    """
+    index = pd.to_datetime(np.array(content["seconds"], dtype=float), unit="s", utc=True)
+    columns = {
+        name: np.array([math.nan if v is None else v for v in values])
+        for name, values in zip(content["columns"], content["values"], strict=True)
+    }
+    return Forecast(pd.DataFrame(columns, index=pd.DatetimeIndex(index).tz_convert(content["timezone"])))
+
+
+def needed_columns(site: Site) -> tuple[str, ...]:
+    """Name the measurements that plans rest on: all but those of points that are set.
+
+    Parameters
+    ----------
+    site : Site
+        As read.
+    """
+    zones = {f"{zone}/zone_air_temperature_sensor" for zone in site.plant.zones}
+    kept = [name for name in site.file.points if name not in site.plant.actuators]
+    return tuple(name for name in kept if name in zones or name.endswith(OUTDOOR_TEMPERATURE) or "power" in name)

@@ -1,0 +1,113 @@
+"""Repeats what a log says was decided, and compares it bit for bit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from mpc.errors import LiveError
+from mpc.live.audit import canonical, code_version, read_log
+from mpc.live.guard.decide import Guard
+from mpc.live.guard.rules import GuardRules
+from mpc.live.planner import Planner
+from mpc.live.site import Site
+
+
+@dataclass
+class Replay:
+    """What came of a replay.
+
+    Parameters
+    ----------
+    lines, decisions : int
+        Events read, and decisions or plans that were repeated.
+    broken : str
+        Where the chain of hashes breaks; empty where it holds.
+    different : list of str
+        Decisions that do not repeat.
+    notes : list of str
+        What was not repeated, and why.
+    last : str
+        Hash of the last event.
+    """
+
+    lines: int = 0
+    decisions: int = 0
+    broken: str = ""
+    different: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    last: str = ""
+
+    @property
+    def fine(self) -> bool:
+        """Whether the chain holds and everything repeated."""
+        return not self.broken and not self.different
+
+
+def replay_log(path: Path, site: Path | None = None, before: str | None = None) -> Replay:
+    """Repeat a file of an audit log.
+
+    Parameters
+    ----------
+    path : Path
+        Of the guard, the controller or the collector.
+    site : Path, optional
+        The ``site.yaml`` of that time, which plans are repeated with; the decisions of the guard need none.
+    before : str, optional
+        Hash that the file must go on from.
+
+    Raises
+    ------
+    LiveError
+        When the file cannot be read, or the site is another one.
+    """
+    LiveError.unless(path.is_file(), str(path), "a file of an audit log", "no such file")
+    found, guard, planner = Replay(), None, None
+    events = read_log(path, before)
+    while True:
+        try:
+            at, entry = next(events)
+        except StopIteration:
+            return found
+        except LiveError as error:
+            found.broken = str(error)
+            return found
+        found.lines, found.last = found.lines + 1, entry["hash"]
+        kind, content = entry["kind"], entry["content"]
+        if kind == "start":
+            _note_code(found, content)
+            if "rules" in content:
+                guard = Guard(GuardRules.from_dict(content["rules"]), content["modes"], content["held_before"])
+            elif "controller" in content:
+                planner = _planner(site, content, found)
+        elif kind == "tick" and guard is not None:
+            _compare(found, path, at, guard.decide(content["tick"]), content["decision"])
+        elif kind == "plan" and planner is not None:
+            again = planner.plan(content["inputs"])
+            _compare(found, path, at, again, {key: content["plan"].get(key) for key in again})
+    return found
+
+
+def _note_code(found: Replay, content: dict[str, Any]) -> None:
+    if content["code"] != code_version():
+        found.notes.append(f"the log was written by {content['code']}, and is repeated by {code_version()}")
+
+
+def _planner(site: Path | None, content: dict[str, Any], found: Replay) -> Planner | None:
+    if site is None:
+        found.notes.append("plans are not repeated without the site: pass --site site.yaml")
+        return None
+    read = Site(site)
+    LiveError.unless(
+        read.hash == content["configuration"], site.name, f"configuration {content['configuration'][:12]} of the log",
+        read.hash[:12], "take the site's and plant's files and the model of that time",
+    )  # fmt: skip
+    return Planner(read)
+
+
+def _compare(found: Replay, path: Path, at: int, again: Any, logged: Any) -> None:
+    found.decisions += 1
+    if canonical(again) != canonical(logged):
+        keys = [key for key in again if canonical(again[key]) != canonical(logged.get(key))]
+        found.different.append(f"{path.name}: line {at}: other {', '.join(keys)}")

@@ -1,0 +1,395 @@
+"""What stands in a ``site.yaml``: how a described building is operated."""
+
+from __future__ import annotations
+
+import hashlib
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, ValidationError, model_validator
+
+from mpc.adapters.described.read import read_description
+from mpc.adapters.described.schema import Kelvin, PlantFile
+from mpc.errors import LiveError
+from mpc.live.clock import Clock, SimulatedClock
+from mpc.loop.conversion import Conversion, conversion
+from thermal.case.building import Entry, Number, Positive, Text
+from thermal.case.points import POINT_TYPES
+from thermal.case.schema_file import read_mapping, schema_error
+from thermal.errors import nearest
+
+#: What is done with a plan's value of a point: it is kept, shown for a click, or written.
+Mode = Literal["shadow", "advise", "act"]
+
+#: Priority of writes on BACnet: above a device's own programs, which have 15 and 16 by custom, and below those that
+#: ASHRAE Standard 135, table 19-1, names: life safety 1 and 2, critical equipment 5, minimum on and off 6, manual
+#: operator 8; 9 to 14 are free.
+PRIORITY = 13
+
+
+class BacnetLink(Entry):
+    """A BACnet/IP device.
+
+    Parameters
+    ----------
+    kind : str
+        ``bacnet``.
+    address : str
+        Of the device, ``10.0.0.7`` or ``10.0.0.7:47809``.
+    local : str
+        Of this machine on that network, ``10.0.0.5/24`` or ``10.0.0.5/24:0``; port 0 takes a free one.
+    priority : int
+        That values are written at, 1 to 16.
+    timeout : float
+        How long a request waits for its answer [s].
+    """
+
+    kind: Literal["bacnet"]
+    address: Text
+    local: Text = "127.0.0.1/8:0"
+    priority: Annotated[int, Field(ge=1, le=16, strict=True)] = PRIORITY
+    timeout: Positive = 3.0
+
+
+class MqttLink(Entry):
+    """A broker of MQTT.
+
+    Parameters
+    ----------
+    kind : str
+        ``mqtt``.
+    host : str
+        Of the broker.
+    port : int
+        Of the broker; 8883 by custom with `tls`.
+    user, password_file : str, optional
+        How to log in; the password is the first line of the file, relative to the site's.
+    tls : bool
+        Whether to encrypt, with the machine's certificates.
+    timeout : float
+        Age from which on a value that nobody has published again is none any more [s].
+    """
+
+    kind: Literal["mqtt"]
+    host: Text
+    port: Annotated[int, Field(ge=1, le=65535, strict=True)] = 1883
+    user: Text | None = None
+    password_file: Text | None = None
+    tls: bool = False
+    timeout: Positive = 900.0
+
+
+class PointEntry(Entry):
+    """A point: where it is read, and what may be written to it.
+
+    Parameters
+    ----------
+    connection : str
+        Name of a connection.
+    at : str
+        Where on it: ``analog-value,3`` of BACnet, ``read/topic`` or ``read/topic write/topic`` of MQTT.
+    unit : str, optional
+        There; the library's by default.
+    mode : {"shadow", "advise", "act"}
+        What is done with what is planned for it.
+    range : tuple of float, optional
+        Lowest and highest value that is written [library's unit], or temperatures with their unit.
+    rate : float, optional
+        Largest change of what is written in an hour [library's unit/h]; 0 lets it change at once, as switches do.
+    release : str or float, optional
+        How it is given back: ``relinquish`` (BACnet), or a value that is written then [library's unit].
+    """
+
+    connection: Text
+    at: Text
+    unit: Text | None = None
+    mode: Mode = "shadow"
+    range: tuple[Kelvin, Kelvin] | None = None
+    rate: Annotated[Number, Field(ge=0)] | None = None
+    release: Literal["relinquish"] | Kelvin | None = None
+
+    @model_validator(mode="after")
+    def _may_be_written(self) -> PointEntry:
+        missing = [key for key in ("range", "rate", "release") if getattr(self, key) is None]
+        if self.mode != "shadow" and missing:
+            raise ValueError(f"expected range, rate and release of a point in mode {self.mode}, without "
+                             f"{', '.join(missing)}")  # fmt: skip
+        if self.range is not None and not self.range[0] < self.range[1]:
+            raise ValueError("expected a range whose lower end comes first")
+        if self.range is not None and isinstance(self.release, float):
+            low, high = self.range
+            if not low <= self.release <= high:
+                raise ValueError(f"expected a release value within the range {low:g} to {high:g}")
+        return self
+
+
+class DatabaseEntry(Entry):
+    """The historian.
+
+    Parameters
+    ----------
+    address : str
+        ``postgresql://user@host/name``; a password belongs into a ``.pgpass``.
+    schema_name : str
+        Of the tables.
+    retention : float, optional
+        Days that samples are kept [d]; for ever by default.
+    spool : int
+        Largest size of what waits on disk while the database is down [MB].
+    """
+
+    address: Text
+    schema_name: Annotated[Text, Field(alias="schema")] = "buildingmpc"
+    retention: Positive | None = None
+    spool: Annotated[int, Field(ge=1, strict=True)] = 2000
+
+
+class GuardEntry(Entry):
+    """Limits of the guard; each has a default from the control step.
+
+    Parameters
+    ----------
+    tick : float, optional
+        Time between two looks [s]; a tenth of the control step, a minute at most.
+    heartbeat : float, optional
+        Longest silence of the controller [s]; a fifth of the control step.
+    plan_age : float, optional
+        Age from which on a plan is not followed any more [s]; one and a half control steps.
+    input_age : float, optional
+        Age from which on a measurement that a plan rests on is too old [s]; three readings, a fifth of the control
+        step at least and a whole one at most.
+    clock_jump : float
+        Largest difference between the steps of the wall clock and of the monotonic one [s].
+    override_hold : float, optional
+        How long a point is left alone after an operator has given it back [s]; a control step.
+    stuck : float, optional
+        Time after which a zone's temperature that has not moved by a bit is taken for a failed sensor [s]; never by
+        default, as sensors of a coarse resolution stand still.
+    approval : float, optional
+        How long a value holds that an operator has approved [s]; four control steps.
+    """
+
+    tick: Positive | None = None
+    heartbeat: Positive | None = None
+    plan_age: Positive | None = None
+    input_age: Positive | None = None
+    clock_jump: Positive = 5.0
+    override_hold: Annotated[Number, Field(ge=0)] | None = None
+    stuck: Positive | None = None
+    approval: Positive | None = None
+
+
+class PageEntry(Entry):
+    """The page.
+
+    Parameters
+    ----------
+    host : str
+        Where it listens; others than this machine's own need `tokens`.
+    port : int
+        Of it.
+    """
+
+    host: Text = "127.0.0.1"
+    port: Annotated[int, Field(ge=0, le=65535, strict=True)] = 8080
+
+
+class NotifyEntry(Entry):
+    """Who is told of alarms.
+
+    Parameters
+    ----------
+    webhook : str, optional
+        Address that a JSON object with ``site``, ``time`` and ``alarms`` is posted to.
+    mail : str, optional
+        Address that mail goes to.
+    smtp : str
+        Host, or host:port, that takes the mail.
+    """
+
+    webhook: Text | None = None
+    mail: Text | None = None
+    smtp: Text = "localhost:25"
+
+
+class SiteFile(Entry):
+    """A ``site.yaml``.
+
+    Parameters
+    ----------
+    format : int
+        1.
+    name : str
+        Of the site.
+    plant : str
+        The ``plant.yaml``, relative to this file: zones, comfort, prices, weather, forecasts, control step.
+    controller : {"mpc", "full_speed"}
+        Optimal control by the model of ``buildingmpc identify``, or the rule without any.
+    model : str, optional
+        Folder of the model, relative to this file.
+    folder : str
+        For logs, spool and sockets, relative to this file.
+    database : DatabaseEntry
+        The historian.
+    connections : mapping of str to BacnetLink or MqttLink
+        By name.
+    points : mapping of str to PointEntry
+        By ``ENTITY/POINT``.
+    collect : float
+        Time between two readings of all points [s].
+    clock_rate : float
+        How many times faster than real time all clocks run, for simulated sites on this machine [-].
+    guard : GuardEntry
+        Its limits.
+    page : PageEntry
+        The page.
+    notify : NotifyEntry
+        Alarms.
+    """
+
+    format: Literal[1]
+    name: Text
+    plant: Text
+    controller: Literal["mpc", "full_speed"] = "mpc"
+    model: Text | None = None
+    folder: Text = "live"
+    database: DatabaseEntry
+    connections: Annotated[
+        dict[Text, Annotated[BacnetLink | MqttLink, Field(discriminator="kind")]], Field(min_length=1)
+    ]
+    points: Annotated[dict[Text, PointEntry], Field(min_length=1)]
+    collect: Positive = 60.0
+    clock_rate: Positive = 1.0
+    guard: GuardEntry = GuardEntry()
+    page: PageEntry = PageEntry()
+    notify: NotifyEntry = NotifyEntry()
+
+
+class Site:
+    """A site as its file describes it, with its plant.
+
+    Parameters
+    ----------
+    path : Path
+        The ``site.yaml``.
+
+    Attributes
+    ----------
+    file : SiteFile
+        As read.
+    plant : PlantFile
+        Of the building.
+    folder : Path
+        For logs, spool and sockets; made where it is not there, for this user alone.
+    hash : str
+        SHA-256 of the site's file, the plant's and the model's: the configuration that plans and logs name.
+
+    Raises
+    ------
+    LiveError
+        When the file does not fit its schema, or names what is not there.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+        content = read_mapping(self.path, LiveError, self.path.name, "a description of a site")
+        try:
+            self.file = SiteFile.model_validate(content)
+        except ValidationError as error:
+            raise schema_error(error, LiveError, self.path.name, SiteFile) from error
+        here = self.path.parent
+        self.plant_path = here / self.file.plant
+        self.plant: PlantFile = read_description(self.plant_path)
+        self.model_path = None if self.file.model is None else here / self.file.model
+        self.folder = here / self.file.folder
+        self._check()
+        self.folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        self.hash = self._hash()
+
+    @property
+    def step(self) -> float:
+        """Control step [s]."""
+        return self.plant.control_step
+
+    @property
+    def sockets(self) -> Path:
+        """Address of the guard on this machine."""
+        return self.folder / "guard.sock"
+
+    @cached_property
+    def conversions(self) -> dict[str, Conversion]:
+        """What brings each point's values into the library's unit."""
+        return {
+            name: conversion(name.rpartition("/")[2], entry.at, entry.unit) for name, entry in self.file.points.items()
+        }
+
+    def clock(self) -> Clock:
+        """Give the site's clock: the machine's, or one that runs faster, of which the site's folder has the state."""
+        if self.file.clock_rate == 1.0:
+            return Clock()
+        return SimulatedClock(self.folder / "clock.json", self.file.clock_rate)
+
+    @property
+    def writable(self) -> dict[str, PointEntry]:
+        """Points that may ever be written to: those with a range, a rate and a release."""
+        return {
+            name: entry for name, entry in self.file.points.items()
+            if entry.range is not None and entry.rate is not None and entry.release is not None
+        }  # fmt: skip
+
+    def _check(self) -> None:
+        """Refuse names that fit nothing."""
+        file, name = self.file, self.path.name
+        for point, entry in file.points.items():
+            where = f"{name}: points.{point}"
+            LiveError.unless_known(entry.connection, file.connections, f"{where}.connection", "a name of `connections`")
+            kind = point.rpartition("/")[2]
+            advice = nearest(kind, POINT_TYPES) if kind not in POINT_TYPES else ""
+            expected = "ENTITY/POINT with a point of the case format, or an actuator of the plant"
+            known = kind in POINT_TYPES or point in self.plant.actuators
+            LiveError.unless("/" in point and known, where, expected, repr(point), advice)
+            bacnet = isinstance(file.connections[entry.connection], BacnetLink)
+            found = f"release {entry.release!r} on {file.connections[entry.connection].kind}"
+            LiveError.unless(
+                bacnet or entry.release != "relinquish", f"{where}.release", "a value where there are no priorities",
+                found,
+            )  # fmt: skip
+        for point in self.writable:
+            LiveError.unless_known(point, self.plant.actuators, f"{name}: points.{point}", "an actuator of the plant")
+        needed = [f"{zone}/zone_air_temperature_sensor" for zone in self.plant.zones]
+        missing = [point for point in needed if point not in file.points]
+        LiveError.unless(not missing, f"{name}: points", "the temperature of each zone", f"none of {missing}")
+        if file.controller == "mpc":
+            advice = "buildingmpc identify, then model: FOLDER; or controller: full_speed"
+            LiveError.unless(file.model is not None, f"{name}: model", "a model for mpc", "none", advice)
+        hosts = [getattr(link, "host", getattr(link, "address", "")) for link in file.connections.values()]
+        local = all(host.startswith(("127.", "localhost", "::1")) for host in hosts)
+        LiveError.unless(
+            file.clock_rate == 1.0 or local, f"{name}: clock_rate", "1 where a connection leads to another machine",
+            f"{file.clock_rate:g}",
+        )  # fmt: skip
+
+    def _hash(self) -> str:
+        total = hashlib.sha256()
+        parts = [self.path, self.plant_path]
+        if self.model_path is not None:
+            parts += sorted(self.model_path.glob("model.json")) if self.model_path.is_dir() else [self.model_path]
+        for part in parts:
+            total.update(part.read_bytes() if part.is_file() else str(part).encode())
+        return total.hexdigest()
+
+    def limits(self) -> dict[str, Any]:
+        """Give the guard's limits with their defaults, by the names of `GuardEntry` [s]."""
+        step, own = self.step, self.file.guard
+        return {
+            "step": step,
+            "tick": own.tick or min(step / 10.0, 60.0),
+            "heartbeat": own.heartbeat or step / 5.0,
+            "plan_age": own.plan_age or 1.5 * step,
+            "input_age": own.input_age or min(max(3.0 * self.file.collect, step / 5.0), step),
+            "clock_jump": own.clock_jump,
+            "override_hold": step if own.override_hold is None else own.override_hold,
+            "stuck": own.stuck,
+            "approval": own.approval or 4.0 * step,
+        }

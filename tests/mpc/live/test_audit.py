@@ -1,0 +1,104 @@
+"""The audit log: a chain that shows every change, and replays that repeat decisions bit for bit."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mpc.errors import LiveError
+from mpc.live.audit import NOTHING, AuditLog, canonical, read_log
+from mpc.live.guard.decide import Guard
+from mpc.live.guard.rules import GuardRules, Limits, PointRule
+from mpc.live.replay import replay_log
+
+SET = "hall/supply_air_temperature_setpoint"
+RULES = GuardRules(
+    "c" * 64, Limits(900.0, 60.0, 180.0, 1350.0, 900.0, 5.0, 900.0, 3600.0),
+    {SET: PointRule("act", 285.0, 295.0, 0.0, "relinquish", 13)}, {},
+)  # fmt: skip
+
+
+def guarded(folder: Path, ticks: int = 6) -> Path:
+    """Log of a guard that takes a plan, follows it and doubts in the end."""
+    log, guard = AuditLog(folder, "guard", 0.0), Guard(RULES)
+    log.append("start", {"code": "x", "rules": RULES.to_dict(), "modes": {}, "held_before": {}, "wall": 0.0})
+    slots: dict[str, float] = {}
+    for k in range(ticks):
+        plan = {"number": 1, "made": 60.0, "configuration": "c" * 64, "status": "planned", "values": {SET: 290.1 + 0.2},
+                "inputs": {}}  # fmt: skip
+        tick = {
+            "mono": 60.0 * k, "wall": 60.0 * k, "beat": 60.0 * min(k, 3), "stopping": False, "results": {SET: ""},
+            "messages": [{"kind": "plan", "plan": plan}] if k == 1 else [],
+            "readings": {SET: {"value": 290.0, "slots": dict(slots), "error": ""}},
+        }  # fmt: skip
+        decision = guard.decide(tick)
+        log.append("tick", {"tick": tick, "decision": decision})
+        slots = {"13": decision["writes"][SET]} if decision["writes"] else {} if decision["releases"] else slots
+    log.close()
+    return log.path
+
+
+def test_a_log_replays(tmp_path: Path) -> None:
+    path = guarded(tmp_path)
+    found = replay_log(path, before=NOTHING)
+    assert found.fine and found.lines == 7 and found.decisions == 6
+    assert found.notes and "was written by x" in found.notes[0]
+    decisions = [e["content"]["decision"] for _, e in read_log(path) if e["kind"] == "tick"]
+    assert decisions[1]["writes"] == {SET: 290.1 + 0.2} and decisions[2]["held"]
+
+
+@pytest.mark.parametrize(
+    ("spoil", "line"),
+    [
+        (lambda lines: [*lines[:3], lines[3].replace(b"290.3", b"299.9"), *lines[4:]], "line 4"),
+        (lambda lines: lines[:2] + lines[3:], "line 3"),
+        (lambda lines: [*lines[:3], lines[2], *lines[3:]], "line 4"),
+        (lambda lines: [lines[0], lines[2], lines[1], *lines[3:]], "line 2"),
+        (lambda lines: [*lines[:4], b"{}\n", *lines[4:]], "line 5"),
+        (lambda lines: [*lines[:4], b"\xff[\n", *lines[4:]], "line 5"),
+        (lambda lines: lines[1:], "line 1"),
+    ],
+)
+def test_what_breaks_the_chain_is_named(tmp_path: Path, spoil: Any, line: str) -> None:
+    path = guarded(tmp_path)
+    path.write_bytes(b"".join(spoil(path.read_bytes().splitlines(keepends=True))))
+    found = replay_log(path, before=NOTHING)
+    assert not found.fine and f"{path.name}: {line}:" in found.broken
+
+
+def test_a_decision_that_was_forged_with_its_chain_does_not_replay(tmp_path: Path) -> None:
+    entries = [e for _, e in read_log(guarded(tmp_path / "a"))]
+    log = AuditLog(tmp_path / "b", "guard", 0.0)
+    for entry in entries:
+        if entry["kind"] == "tick" and entry["content"]["decision"]["writes"]:
+            entry["content"]["decision"]["writes"][SET] = 291.0
+        log.append(entry["kind"], entry["content"])
+    log.close()
+    found = replay_log(log.path)
+    assert not found.broken and found.different == ["guard-000000.jsonl: line 3: other writes"]
+
+
+def test_files_go_on_from_each_other_and_a_torn_line_is_left_out(tmp_path: Path) -> None:
+    first = guarded(tmp_path)
+    with first.open("ab") as file:
+        file.write(b'{"n": 7, "torn')
+    second = guarded(tmp_path)
+    assert second.name == "guard-000001.jsonl"
+    last = replay_log(first).last
+    assert replay_log(first).fine and replay_log(second, before=last).fine
+    assert "before it" in replay_log(second, before="0" * 64).broken
+
+
+def test_only_finite_numbers_of_one_spelling() -> None:
+    assert canonical({"b": 0.1 + 0.2, "a": -0.0}) == '{"a":-0.0,"b":0.30000000000000004}'
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        canonical({"x": float("nan")})
+    assert json.loads(canonical(1e-323)) == 1e-323
+
+
+def test_no_log_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(LiveError, match="no such file"):
+        replay_log(tmp_path / "guard-000000.jsonl")
