@@ -83,7 +83,7 @@ RUNS = {
 
 PICTURES = {
     "calibration": Picture("calibrate", "mean_absolute_error_over_the_horizon"),
-    "opening": Picture("diagnose", page=(0, 690)),
+    "opening": Picture("diagnose", page=(0, 680)),
     "where": Picture("diagnose", "missing_heat_on_floor_f1"),
     "how_far": Picture("diagnose", "zone_f1_s"),
     "monitoring": Picture("monitor", "changes"),
@@ -112,7 +112,7 @@ def ready(name: str, out: Path) -> Path:
 def drawn(picture: Picture, folder: Path) -> Image.Image:
     """A figure of a run, or a part of its page."""
     if picture.figure:
-        found = sorted(folder.rglob(f"figure_*_{picture.figure}*.png"))
+        found = sorted(folder.rglob(f"figure_??_{picture.figure}*.png"))
         if not found:
             names = ", ".join(sorted(p.name for p in folder.glob("*.png")))
             raise SystemExit(f"{folder}: expected a figure '{picture.figure}', found {names}")
