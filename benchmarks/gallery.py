@@ -88,7 +88,7 @@ PICTURES = {
     "how_far": Picture("diagnose", "zone_f1_s"),
     "monitoring": Picture("monitor", "changes"),
     "compare": Picture("compare", "XX"),
-    "closed_loop": Picture("control", "XX"),
+    "closed_loop": Picture("control", "optimal_control"),
     "heat_pump": Picture("identify", "XX"),
     "many": Picture("many", "errors_of_each_building"),
 }
