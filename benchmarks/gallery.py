@@ -87,9 +87,10 @@ PICTURES = {
     "where": Picture("diagnose", "missing_heat_on_floor_f1"),
     "how_far": Picture("diagnose", "zone_f1_s"),
     "monitoring": Picture("monitor", "changes"),
-    "compare": Picture("compare", "XX"),
+    "costs": Picture("compare", "energy_cost_and_discomfort"),
+    "compare": Picture("compare", "cost"),
     "closed_loop": Picture("control", "optimal_control"),
-    "heat_pump": Picture("identify", "XX"),
+    "heat_pump": Picture("identify", "power_and_efficiency"),
     "many": Picture("many", "errors_of_each_building"),
 }
 
