@@ -30,7 +30,7 @@ IMAGES = ROOT / "docs" / "images"
 #: The year of the monitoring's benchmark that is shown: its seed, one without a table, and days that are kept of it.
 YEAR_SEED, YEAR_DAYS, STEPS_A_DAY = 150, 140, 48
 #: Width of a picture, and colours that it keeps: text stays sharp, a picture stays below some 100 kB.
-WIDTH, COLOURS = 1400, 96
+WIDTH, COLOURS = 1400, 255
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ def ready(name: str, out: Path) -> Path:
 
 
 def drawn(picture: Picture, folder: Path) -> Image.Image:
-    """A figure of a run, or a part of its page."""
+    """Open a figure of a run, or take a picture of a part of its page."""
     if picture.figure:
         found = sorted(folder.rglob(f"figure_??_{picture.figure}*.png"))
         if not found:
@@ -127,7 +127,9 @@ def drawn(picture: Picture, folder: Path) -> Image.Image:
         sizes = [f"--window-size=1100,{bottom}", "--force-device-scale-factor=1.5", "--hide-scrollbars"]
         page = (folder / "report.html").resolve().as_uri()
         subprocess.run(
-            [browser, "--headless", "--no-sandbox", *sizes, f"--screenshot={shot}", page], check=True, capture_output=True
+            [browser, "--headless", "--no-sandbox", *sizes, f"--screenshot={shot}", page],
+            check=True,
+            capture_output=True,
         )
         image = Image.open(io.BytesIO(shot.read_bytes()))
     return image.crop((0, round(1.5 * top), image.width, round(1.5 * bottom)))
