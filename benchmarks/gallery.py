@@ -1,8 +1,8 @@
 """Pictures of ``docs/gallery.md``: reports of the bundled case and of small buildings that are made here.
 
-Run: ``python benchmarks/gallery.py --out results/gallery``, with the extra ``[energyplus]`` and, for the pictures of whole
-pages, chromium; a quarter of an hour. A run whose results are there is not run again, so that one of them is made anew
-by removing its folder. ``--only NAME`` makes one picture. They are written into ``docs/images``, names ``gallery_*.png``.
+Run: ``python benchmarks/gallery.py --out results/gallery``, with the extra ``[energyplus]`` and, for the picture of a whole
+page, chromium; a quarter of an hour. A run whose results are there is not run again, so that one of them is made anew
+by removing its folder. ``--only NAME`` makes one picture. They go into ``docs/images``, as ``gallery_NAME.png``.
 """
 
 from __future__ import annotations
@@ -75,7 +75,8 @@ RUNS = {
     "diagnose": "diagnose {case}",
     "compare": "compare {case} --parameters {diagnose}/calibration.json --controllers schedule,guideline36,mpc "
     "--start 2023-03-02 --end 2023-03-09",
-    "control": "control {case} --parameters {diagnose}/calibration.json --controller mpc --start 2023-03-06 --end 2023-03-08",
+    "control": "control {case} --parameters {diagnose}/calibration.json --controller mpc "
+    "--start 2023-03-06 --end 2023-03-08",
     "monitor": "monitor {year}",
     "identify": "identify {plants}/house/plant.yaml --days 14",
     "many": "calibrate {fleet} --workers 1 --dx 1",
