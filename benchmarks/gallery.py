@@ -1,7 +1,7 @@
 """Pictures of ``docs/gallery.md``: reports of the bundled case and of small buildings that are made here.
 
-Run: ``python benchmarks/gallery.py --out results/gallery``, with the extra ``[energyplus]`` and, for the picture of a whole
-page, chromium; a quarter of an hour. A run whose results are there is not run again, so that one of them is made anew
+Run: ``python benchmarks/gallery.py --out results/gallery``, with the extra ``[energyplus]`` and, for a page's picture,
+chromium; a quarter of an hour. A run whose results are there is not run again, so that one of them is made anew
 by removing its folder. ``--only NAME`` makes one picture. They go into ``docs/images``, as ``gallery_NAME.png``.
 """
 
