@@ -4,7 +4,7 @@ A block is what stands between two fences. In a language that runs (`sh`, `conso
 is written as the file of that name. A comment on the line above, which the pages do not show, says what else counts:
 
     <!-- snippet: slow -->                      run in the slow set alone, as it takes over some seconds
-    <!-- snippet: background -->                left running once it has named its address; ended at the page's end
+    <!-- snippet: background -->                left running once it has named its address; ended with its page
     <!-- snippet: needs pyenergyplus -->        run where that module is installed
     <!-- snippet: not run: needs a database --> none of these; with the reason
 
@@ -27,6 +27,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import traceback
 from collections.abc import Iterator
@@ -142,18 +143,52 @@ def run_page(page: Path, *, slow: bool = False) -> list[Outcome]:
         give(Path(folder), "\n".join(s.text for s in wanted))
         paths = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
         here = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH", "")]))
-        answer = subprocess.run(
-            [sys.executable, __file__],
-            input=json.dumps([asdict(s) for s in wanted]),
-            env={**os.environ, "PATH": paths, "PYTHONPATH": here, "COLUMNS": "120", "NO_COLOR": "1"},
-            cwd=folder,
-            capture_output=True,
-            text=True,
-            check=False,
+        answer = _answer(
+            json.dumps([asdict(s) for s in wanted]),
+            Path(folder),
+            {**os.environ, "PATH": paths, "PYTHONPATH": here, "COLUMNS": "120", "NO_COLOR": "1"},
         )
-    if answer.returncode:
-        raise RuntimeError(f"{page}: its process ended with {answer.returncode}: {answer.stderr[-2000:]}")
-    return [Outcome(**outcome) for outcome in json.loads(answer.stdout)]
+    return [Outcome(**outcome) for outcome in json.loads(answer)]
+
+
+def _answer(blocks: str, folder: Path, environment: dict[str, str]) -> str:
+    """Run blocks in a process that leads a group with all that it starts; nothing of the group is left at the end."""
+    with tempfile.TemporaryFile("w+", encoding="utf-8") as complaints:
+        process = subprocess.Popen(
+            [sys.executable, __file__],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=complaints,
+            env=environment,
+            cwd=folder,
+            text=True,
+            start_new_session=True,
+        )
+        stdin, stdout = process.stdin, process.stdout
+        if stdin is None or stdout is None:
+            raise RuntimeError("pipes were asked for")
+        try:
+            stdin.write(blocks + "\n")
+            stdin.flush()  # it stays open: its end tells the other side that this process is gone
+            answer = stdout.read()
+            process.wait()
+        finally:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+            stdin.close()
+            stdout.close()
+        if process.returncode:
+            complaints.seek(0)
+            said = complaints.read()[-2000:]
+            raise RuntimeError(f"{folder}: the process of a page ended with {process.returncode}: {said}")
+        return answer
+
+
+def _end_with_parent() -> None:
+    """Wait, in a thread, until the process that gave the blocks is gone, however it ended; then end the group."""
+    sys.stdin.read()
+    os.killpg(os.getpgrp(), signal.SIGKILL)
 
 
 def give(folder: Path, text: str) -> None:
@@ -246,7 +281,6 @@ def start(call: list[str], background: list[subprocess.Popen[str]]) -> tuple[boo
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
-        start_new_session=True,
     )
     background.append(process)
     said, began = "", time.monotonic()
@@ -303,18 +337,17 @@ def run(blocks: list[Snippet]) -> Iterator[Outcome]:
                 return
     finally:
         for process in background:
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGINT)
+            process.send_signal(signal.SIGINT)
             with contextlib.suppress(subprocess.TimeoutExpired):
-                process.wait(20.0)
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)
+                process.wait(20.0)  # what is left then goes with the group
 
 
 if __name__ == "__main__":
     results, real = list[dict[str, Any]](), os.dup(1)
     os.dup2(2, 1)  # what is printed beside sys.stdout must not mix with the answer
     sys.path[0] = ""  # the reader's folder, as for an interpreter that is started there
-    results = [asdict(outcome) for outcome in run([Snippet(**s) for s in json.load(sys.stdin)])]
+    given = json.loads(sys.stdin.readline())
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    results = [asdict(outcome) for outcome in run([Snippet(**s) for s in given])]
     with os.fdopen(real, "w", encoding="utf-8") as answer:
         json.dump(results, answer)

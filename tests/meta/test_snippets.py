@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import ast
+import os
 import re
 import shlex
+import subprocess
+import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +25,6 @@ ROOT = Path(__file__).parents[2]
 def runner() -> Any:
     """Give the module that knows the pages' blocks and runs them."""
     import importlib
-    import sys
 
     sys.path.insert(0, str(ROOT / "benchmarks"))
     try:
@@ -34,7 +38,7 @@ PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_blocks_run_as_printed(page: Path, runner: Any) -> None:
-    """Those that are quick; the others by benchmarks/documented_snippets.py, which continuous integration runs."""
+    """Those that are quick; the slow ones are run by hand, with benchmarks/documented_snippets.py: they take too long for every run."""
     failed = [f"{o.where}\n{o.said}" for o in runner.run_page(page) if not o.passed]
     assert not failed, "\n".join(failed)
 
@@ -123,3 +127,39 @@ def test_what_fails_is_told(runner: Any, tmp_path: Path, monkeypatch: Any) -> No
         first, *later = runner.run_page(page)
         assert not first.passed and first.where == "page.md:2" and not later
     assert "here" in first.said
+
+
+def test_what_a_page_started_ends_with_its_runner(tmp_path: Path) -> None:
+    """A server in the background and the page's process are gone after the runner was killed."""
+    fence, where = "`" * 3, tmp_path / "where"
+    page, docs = tmp_path / "page.md", f"echo $$ > {where}.new; mv {where}.new {where}; echo http://here; exec sleep 60"
+    page.write_text(
+        f"<!-- snippet: background -->\n{fence}sh\n{docs}\n{fence}\n\n{fence}sh\nsleep 60\n{fence}\n", encoding="utf-8"
+    )
+    call = f"import _snippets; _snippets.ROOT = _snippets.Path({str(tmp_path)!r}); _snippets.run_page(_snippets.Path({str(page)!r}))"
+    path = os.pathsep.join(filter(None, [str(ROOT / "benchmarks"), os.environ.get("PYTHONPATH", "")]))
+    with subprocess.Popen([sys.executable, "-c", call], env={**os.environ, "PYTHONPATH": path}) as runner:
+        assert _comes(where.exists)
+        runner.kill()
+    server = int(where.read_text())
+    assert _comes(lambda: not _runs(server))
+
+
+def _runs(process: int) -> bool:
+    """Whether a process is there, and no mere entry that nobody has asked for."""
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    state = subprocess.run(
+        ["ps", "-o", "stat=", "-p", str(process)], capture_output=True, text=True, check=False
+    ).stdout
+    return bool(state.strip()) and not state.startswith("Z")
+
+
+def _comes(true: Callable[[], bool], limit: float = 30.0) -> bool:
+    """Whether something becomes true within some seconds."""
+    end = time.monotonic() + limit
+    while not true() and time.monotonic() < end:
+        time.sleep(0.05)
+    return true()
