@@ -62,8 +62,7 @@ class Effect:
     zonal : bool
         Whether it may be there in some zones only; it then has a strength a zone.
     alike : bool
-        Whether one cause may give it to all zones with one strength: doors that are kept open, water that is too cold,
-        a factor in all meters. Valves leak and sensors drift one by one.
+        Whether one cause may give all zones one strength: cold water, a meters' factor. Valves leak one by one.
     requires : tuple of str
         Effects that it modifies, and without which it means nothing.
     applies : callable, optional
