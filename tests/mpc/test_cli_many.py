@@ -125,7 +125,7 @@ def test_a_run_that_is_killed_or_interrupted_goes_on(cases: Path, tmp_path: Path
 
     answer = run("calibrate", cases, "--out", out, *OPTIONS)
     assert answer.exit_code == 0
-    for text in ("Held-out error 1h ahead", "office 1", "calibrated, done before", f"Results: {out}"):
+    for text in ("Held-out error 1h ahead", "office 1", "calibrated, done before", f"Report: {out / 'report.html'}"):
         assert text in answer.stdout
     answer = run("calibrate", cases, "--out", out, *OPTIONS, "--horizon", "2h")
     assert (answer.exit_code, answer.stdout) == (2, "")
