@@ -214,7 +214,9 @@ def thin(figure: Figure, sharpness: float = 1.0) -> None:
                     artist.set_data(x[kept], y[kept])
             elif isinstance(artist, PolyCollection):
                 corners = [np.asarray(path.vertices)[:-1] for path in artist.get_paths() if len(path.vertices)]
-                thinned = [_thinned_band(each, columns) for each in corners]
+                whole = float(np.ptp(np.concatenate([each[:, 0] for each in corners]))) if corners else 0.0
+                shares = [float(np.ptp(each[:, 0])) / max(whole, 1e-12) for each in corners]  # of parts between gaps
+                thinned = [_thinned_band(e, max(1, round(columns * s))) for e, s in zip(corners, shares, strict=True)]
                 if sum(map(len, thinned)) < sum(map(len, corners)):
                     artist.set_verts(thinned)
 
