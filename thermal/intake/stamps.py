@@ -57,8 +57,8 @@ class ClockReport:
             yield f"{self.unreadable} rows without a time stamp that can be read were left out"
         if self.impossible:
             yield (
-                f"{self.impossible} rows are not {EXPECTED} (first {self.first_impossible}) and were left out: a logger "
-                "whose clock was lost, or a mistyped stamp; correct them in the table where their values matter"
+                f"{self.impossible} rows are not {EXPECTED} (first {self.first_impossible}) and were left out: a "
+                "logger whose clock was lost, or a mistyped stamp; correct them in the table where their values matter"
             )
         if self.resolved:
             yield f"{self.resolved} values of the hour that {timezone} has twice were told apart by their order"

@@ -46,8 +46,9 @@ _LONG = re.compile(r"(?<=[ LMCQ\"-])(\d+\.\d\d)\d+(?=[ \n\"LMCQ])")
 #: How high a figure on a phone is against one of its axes before, for each of those below each other [-].
 _LOWER = 0.75
 
-#: Columns that a line is thinned to: the pixels of a screen, of which an inch of a figure has so many [1/inch].
-_PIXELS = 96
+#: Columns that lines are thinned to for each inch of a figure [1/inch]: of the 96 pixels an inch has on a screen axes
+#: take two thirds, and a column is at most two of these wide.
+_COLUMNS = 40
 
 _UNIT = re.compile(r"\[([^\]]+)\]")
 
@@ -203,9 +204,9 @@ def thin(figure: Figure, sharpness: float = 1.0) -> None:
     figure : Figure
         Changed; what is short in it stays as it is.
     sharpness : float
-        Columns of each pixel: above 1 for figures that zoom [-].
+        Columns against those of a figure that stands still: above 1 for one that zooms [-].
     """
-    columns = round(sharpness * _PIXELS * float(figure.get_size_inches()[0]))
+    columns = round(sharpness * _COLUMNS * float(figure.get_size_inches()[0]))
     for axes in figure.axes:
         for artist in axes.get_children():
             if isinstance(artist, Line2D) and artist.get_linestyle() != "None":
