@@ -240,7 +240,8 @@ def _refits(work: Work, gains: Sequence[Gain], ahead: Refit | None) -> list[Refi
         for g in gains:
             there_too = CATALOGUE[g.effect].alike if best.screened.zones == ALIKE else CATALOGUE[g.effect].zonal
             confounded = g.effect in CATALOGUE[best.screened.effect].confounders
-            if confounded and there_too and g.effect not in fitted:  # tangents at no strength may miss where it is, or what it does
+            # tangents at no strength may miss where it is, or what it does
+            if confounded and there_too and g.effect not in fitted:
                 other = work.refit([replace(g, zones=best.screened.zones)], work.accepted)
                 found.extend([] if other is None else [other])
     return sorted(found, key=lambda r: -r.gain)

@@ -195,7 +195,7 @@ def for_dark(svg: str) -> str:
 
 
 def thin(figure: Figure, sharpness: float = 1.0) -> None:
-    """Leave out of long lines and bands what no screen shows: of each column of pixels the lowest and highest stay.
+    """Leave out of long lines and bands over time what no screen shows: of each column of pixels the lowest and highest stay.
 
     An average would hide peaks; these stay where and as high as they are.
 
@@ -207,14 +207,15 @@ def thin(figure: Figure, sharpness: float = 1.0) -> None:
         Columns against those of a figure that stands still: above 1 for one that zooms [-].
     """
     columns = round(sharpness * _COLUMNS * float(figure.get_size_inches()[0]))
-    for axes in figure.axes:
+    over_time = [axes for axes in figure.axes if isinstance(axes.xaxis.get_major_locator(), AutoDateLocator)]
+    for axes in over_time:
         for artist in axes.get_children():
             if isinstance(artist, Line2D) and artist.get_linestyle() != "None":
                 x, y = (np.asarray(values, dtype=float) for values in artist.get_data(orig=False))
                 if len(kept := kept_points(x, y, columns)) < len(x):
                     artist.set_data(x[kept], y[kept])
             elif isinstance(artist, PolyCollection):
-                corners = [np.asarray(path.vertices)[:-1] for path in artist.get_paths() if len(path.vertices)]
+                corners = [np.asarray(path.vertices)[:-1] for path in artist.get_paths() if np.size(path.vertices)]
                 whole = float(np.ptp(np.concatenate([each[:, 0] for each in corners]))) if corners else 0.0
                 shares = [float(np.ptp(each[:, 0])) / max(whole, 1e-12) for each in corners]  # of parts between gaps
                 thinned = [_thinned_band(e, max(1, round(columns * s))) for e, s in zip(corners, shares, strict=True)]

@@ -98,8 +98,8 @@ def _words(axes: Axes, shown: Display, tail: str, is_time: bool) -> list[dict[st
         if text.get_transform() == axes.transData and text.get_text().strip():
             at = np.asarray(text.get_position(), dtype=float)
             x = (_times(at[:1], zone) if is_time else course_of(at[:1]))[0]
-            y = course_of(at[1:] if line is None else line(at[1:]))[0]
-            place = {"x": x, "y": y, "xref": f"x{tail}", "yref": f"y{tail}", "xanchor": text.get_ha()}
+            y = course_of([at[1] if line is None else line(float(at[1]))])[0]
+            place = {"x": x, "y": y, "xref": f"x{tail}", "yref": f"y{tail}", "xanchor": text.get_horizontalalignment()}
             found.append(place | {"text": shown.text(text.get_text()), "showarrow": False})
     return found
 
