@@ -43,6 +43,9 @@ DARK = {
 #: Decimals of coordinates beyond a hundredth of a point, which no screen shows: a third of a page.
 _LONG = re.compile(r"(?<=[ LMCQ\"-])(\d+\.\d\d)\d+(?=[ \n\"LMCQ])")
 
+#: Blanks about the corners of a path, a fifth of a long one.
+_BETWEEN = re.compile(r" \n([LMCQ]) (?=[\d-])")
+
 #: How high a figure on a phone is against one of its axes before, for each of those below each other [-].
 _LOWER = 0.75
 
@@ -189,13 +192,13 @@ def for_dark(svg: str) -> str:
         for what in ("fill", "stroke"):
             if f"{what}: {light}" in svg:
                 rules.append(f'[style*="{what}: {light}"]{{{what}:{dark}!important}}')
-    svg = _LONG.sub(r"\1", svg)
+    svg = _BETWEEN.sub(r"\1", _LONG.sub(r"\1", svg))
     at = svg.index(">") + 1
     return f"{svg[:at]}<style>@media (prefers-color-scheme: dark){{{''.join(rules)}}}</style>{svg[at:]}"
 
 
 def thin(figure: Figure, sharpness: float = 1.0) -> None:
-    """Leave out of long lines and bands over time what no screen shows: of each column of pixels the lowest and highest stay.
+    """Leave out of long lines and bands over time what no screen shows: lowest and highest of each column stay.
 
     An average would hide peaks; these stay where and as high as they are.
 

@@ -114,16 +114,16 @@ def picture(figure: Figure, alt: str, *, zoom: bool = False, phone: bool = True)
         Whether it may be laid out anew for a phone; a map, whose text fits its rooms, may not.
     """
     shown = display()
-    for area in figure.findobj(PolyCollection):
-        if isinstance(area, PolyCollection):
-            corners = sum(np.size(path.vertices) // 2 for path in area.get_paths())
-            area.set_rasterized(corners > _MOST_CORNERS)
     interactive = None
     if zoom:
         figure.draw_without_rendering()
         thin(figure, _SHARPNESS)
         interactive = zoomable(figure, shown)
     thin(figure)
+    for area in figure.findobj(PolyCollection):
+        if isinstance(area, PolyCollection):
+            corners = sum(np.size(path.vertices) // 2 for path in area.get_paths())
+            area.set_rasterized(corners > _MOST_CORNERS)
     if shown.converts:
         in_units(figure, shown)
     if shown.figures != "page":

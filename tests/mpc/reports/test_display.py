@@ -154,7 +154,7 @@ def test_what_zooms_is_what_is_drawn() -> None:
 def drawn_y(uri: str) -> list[float]:
     """Heights of the corners of the longest line of a drawing [pt]."""
     lines = re.findall(r'<path d="(M [^"]*)"[^>]*style="fill: none', svg(uri))
-    return [float(y) for y in re.findall(r"[ML] [-\d.]+ ([-\d.]+)", max(lines, key=len))]
+    return [float(y) for y in re.findall(r"[ML] ?[-\d.]+ ([-\d.]+)", max(lines, key=len))]
 
 
 @styled
