@@ -7,7 +7,7 @@ valid one spoilt in a few places (`_fuzz_inputs.py`) by a seed of its own. It ma
 the library's families (a status of 400 to 499 with a message, for a server); anything else that is raised, a status of
 500, or a controller without finite setpoints is a fault, and is listed with its seed.
 
-Run: ``nice -n 10 python benchmarks/fuzz.py --inputs 20000 --out results/fuzz --publish``; five minutes of CPU.
+Run: ``nice -n 10 python benchmarks/fuzz.py --inputs 20000 --out results/fuzz --publish``; eleven minutes of CPU.
 Writes ``fuzz.json`` and ``fuzz.md``.
 """
 

@@ -94,7 +94,10 @@ def _diagnosis(path: Path, dx: float | None) -> tuple[dict[str, Any], ModelSetti
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        raise CalibrationError(str(file), "diagnosis.json as `buildingmpc diagnose` writes it", str(error)) from error
+        found = "nothing" if isinstance(error, FileNotFoundError) else str(error)
+        advice = "give --diagnosis the folder that `buildingmpc diagnose` wrote"
+        expected = "diagnosis.json as `buildingmpc diagnose` writes it"
+        raise CalibrationError(str(file), expected, found, advice) from error
     CalibrationError.unless(isinstance(content, Mapping), str(file), "a mapping", type(content).__name__)
     known = read_settings(file.with_name("calibration.json"))
     return content, ModelSettings(**(known | ({} if dx is None else {"dx": dx})))

@@ -78,9 +78,10 @@ def experiment_means(found: Experiment, outcome: Outcome | None) -> Means:
         then = f"Measure instead: {'; or '.join(found.instead)}." if found.instead else "Measure more."
         return Means(f"It was carried out and does not say whether it is {names}.", "The evidence is too weak.", then)
     if found.verdict == "hopeless":
-        return Means(f"No change of setpoints would tell whether it is {names}.",
-                     f"Of {found.tried} plans the best would tell with a chance of {percent(found.chance)}.",
-                     f"Measure instead: {'; or '.join(found.instead)}.")  # fmt: skip
+        trust = f"Of {found.tried} plans the best would tell with a chance of {percent(found.chance)}, reckoned with a "
+        trust += "model of each cause. Longer plans were not tried, nor any with more discomfort."
+        then = f"Measure instead: {'; or '.join(found.instead)}. Or allow more: --hours, --discomfort."
+        return Means(f"No change of setpoints that was tried would tell whether it is {names}.", trust, then)
     worst = float(found.best.discomfort.max())
     answer = f"{found.schedule.hours:.3g} hours of planned setpoints can tell whether it is {names}."
     trust = f"The chance that it does is {percent(found.chance)}; running as usual has {percent(found.usual_chance)}. "
@@ -112,6 +113,7 @@ def monitoring_means(found: Monitoring) -> Means:
     trust += f" That it is this cause is {sure(shown.probability)} sure."
     advice = CATALOGUE[shown.effect].separated_by if shown.effect in CATALOGUE else ""
     then = "Ask what was done there at that time."
+    then += " If it stays, calibrate again on days since then." if lasting else ""
     then += f" To be sure of the cause, look at: {advice}." if advice else ""
     return Means(answer, trust, then)
 

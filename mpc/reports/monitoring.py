@@ -98,11 +98,16 @@ def event_rows(found: Monitoring) -> list[dict[str, Any]]:
             "since": f"{found.date(e.since):%Y-%m-%d}",
             "until": "lasts" if e.end is None else f"{found.date(e.end):%Y-%m-%d}",
             "what": _what(e), "where": in_zones(e.zones), "sure": sure(e.probability),
-            "size": f"{significant(e.size, 2)} ± {significant(1.645 * e.deviation, 2)} {unit(e.unit)}",
+            "size": _size(e),
             "noticed": f"{found.date(e.alarm):%Y-%m-%d}", "others": "; ".join(others) or "–",
             "told_apart": CATALOGUE[e.effect].separated_by if e.effect in CATALOGUE else "",
         })  # fmt: skip
     return rows
+
+
+def _size(event: Event) -> str:
+    told = f"{significant(event.size, 2)} ± {significant(1.645 * event.deviation, 2)}"
+    return told if event.unit in ("1", "", "-") else f"{told} {unit(event.unit)}"
 
 
 def _what(event: Event) -> str:

@@ -29,6 +29,9 @@ _INTERACTIVE = re.compile(
     r'<figure([^>]*)>((?:(?!</figure>).)*?)<script type="application/json">(.*?)</script></figure>', re.DOTALL
 )
 
+#: A date or a time, which does not wrap.
+_DATE = re.compile(r"\d{4}-\d\d-\d\d( \d\d:\d\d)?")
+
 #: More zones than this are counted, not named.
 _MOST_NAMED = 4
 
@@ -152,7 +155,9 @@ def _cells(
         row = [spell(make_attrgetter(environment, path)(row), how) for _, path, how in columns]
     titles = [column if isinstance(column, str) else column[0] for column in columns]
     kinds = ["unit" if title == "unit" else "text" if k in left else "n" for k, title in enumerate(titles)]
-    return list(zip(["name", *kinds[1:]], row, strict=True))
+    kinds = ["name", *kinds[1:]]
+    kinds = ["when" if _DATE.fullmatch(str(text)) else kind for kind, text in zip(kinds, row, strict=True)]
+    return list(zip(kinds, row, strict=True))
 
 
 def kelvin(value: float) -> str:

@@ -77,7 +77,9 @@ def _found(source: str | Path | Mapping[str, Any], tier: int | None) -> _Item:
         try:
             content = json.loads(Path(source).read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
-            raise ScenarioError(where, "a JSON file of the Utility Rate Database", str(error)) from error
+            found = "no such file" if isinstance(error, FileNotFoundError) else str(error)
+            expected = "a price per kilowatt-hour, such as 0.25, or a JSON file of the Utility Rate Database"
+            raise ScenarioError(where, expected, found) from error
     items = content.get("items", [content]) if isinstance(content, Mapping) else content
     if not isinstance(items, Sequence) or len(items) != 1 or not isinstance(items[0], Mapping):
         found = f"{len(items)} items" if isinstance(items, Sequence) else type(items).__name__

@@ -83,6 +83,7 @@ def test_draw_an_office(tmp_path: Path) -> None:
 
     load("draw_an_office").draw(tmp_path, days=1)
     assert {p.name for p in tmp_path.iterdir()} == {"F1.png", "F2.png", "devices.csv", "export.csv", "plans.yaml", "windows.yaml"}
-    assert Image.open(tmp_path / "F1.png").size[0] == 2 * 40 + 16.0 / 0.05  # paper, and 16 m of wall
+    with Image.open(tmp_path / "F1.png") as image:
+        assert image.size[0] == 2 * 40 + 16.0 / 0.05  # paper, and 16 m of wall
     table = (tmp_path / "export.csv").read_text().splitlines()
     assert len(table) == 289 and "VAV-F1-C01 ZAT" in table[0]

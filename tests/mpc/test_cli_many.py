@@ -128,7 +128,7 @@ def test_a_run_that_is_killed_or_interrupted_goes_on(cases: Path, tmp_path: Path
 
     answer = run("calibrate", cases, "--out", out, *OPTIONS)
     assert answer.exit_code == 0
-    for text in ("Held-out error 1h ahead", "office 1", "calibrated, done before", f"Results: {out}"):
+    for text in ("Held-out error 1h ahead", "office 1", "calibrated, done before", f"Report: {out / 'report.html'}"):
         assert text in answer.stdout
     assert run("priors", out, "--out", tmp_path / "taught").exit_code == 0
     options = ("--priors", tmp_path / "taught" / "priors.json", "--structure", "drawn", *OPTIONS)

@@ -22,7 +22,6 @@ _Part = tuple[IntArray, FloatArray]
 #: Adds an effect to a graph, in some of its zones (all of them when there are none).
 Builder = Callable[["EffectBuilder"], None]
 
-
 #: Words and numbers of the catalogue, by id.
 _TABLE = tomllib.loads(files(__package__).joinpath("catalogue.toml").read_text(encoding="utf-8"))
 

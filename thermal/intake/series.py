@@ -82,11 +82,10 @@ def read_series(source: str, table: str = "", timezone: str = "") -> tuple[dict[
     if (lower.get("date") == stamp and "time" in lower) or (lower.get("time") == stamp and "date" in lower):
         cells = frame[lower["date"]].astype(str).str[:10] + " " + frame[lower["time"]].astype(str)
         frame = frame.drop(columns=lower["time" if lower["date"] == stamp else "date"])
-    stamps = parse_stamps(cells, f"{where}: column {stamp!r}")
+    stamps = parse_stamps(cells, f"{where}: column {stamp!r}", report)
     if stamps.dt.tz is None and not timezone:
         advice = "say whose clock they show: --tz Europe/Berlin"
         raise PlanError(f"{where}: column {stamp!r}", "stamps with an offset", repr(str(cells.iloc[0])), advice)
-    report.unreadable = int(stamps.isna().sum())
     frame = frame.drop(columns=stamp)
     value = next((lower[name] for name in VALUES if name in lower and lower[name] in frame), None)
     keys = [name for name in map(str, frame) if name != value and name.casefold() not in UNITS]

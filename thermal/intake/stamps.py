@@ -23,6 +23,10 @@ class ClockReport:
     ----------
     unreadable
         Rows without a stamp that can be read.
+    impossible
+        Rows of a year that no stamp can lie in (`thermal.case.years`): left out.
+    first_impossible
+        The first of these, as it was written.
     resolved
         Rows in the hour that a clock shows twice whose order told which of the two it was.
     ambiguous
@@ -34,6 +38,8 @@ class ClockReport:
     """
 
     unreadable: int = 0
+    impossible: int = 0
+    first_impossible: str = ""
     resolved: int = 0
     ambiguous: int = 0
     skipped: int = 0
@@ -49,6 +55,11 @@ class ClockReport:
         """
         if self.unreadable:
             yield f"{self.unreadable} rows without a time stamp that can be read were left out"
+        if self.impossible:
+            yield (
+                f"{self.impossible} rows are not {EXPECTED} (first {self.first_impossible}) and were left out: a "
+                "logger whose clock was lost, or a mistyped stamp; correct them in the table where their values matter"
+            )
         if self.resolved:
             yield f"{self.resolved} values of the hour that {timezone} has twice were told apart by their order"
         if self.ambiguous:
@@ -88,7 +99,7 @@ def checked_zone(name: str, where: str) -> str:
     return name
 
 
-def parse_stamps(cells: pd.Series, where: str) -> pd.Series:
+def parse_stamps(cells: pd.Series, where: str, report: ClockReport) -> pd.Series:
     """Read time stamps.
 
     Parameters
@@ -97,6 +108,8 @@ def parse_stamps(cells: pd.Series, where: str) -> pd.Series:
         Times, text or seconds since 1970 (milliseconds where they are over 1e11).
     where
         Source, for messages.
+    report
+        What was left out is added to it.
 
     Returns
     -------
@@ -109,8 +122,13 @@ def parse_stamps(cells: pd.Series, where: str) -> pd.Series:
     PlanError
         They are written in a way that could be read in two, or some have an offset and others none.
     """
-    stamps = _read(cells, where)
-    stamps = stamps.where(within_years(pd.DatetimeIndex(stamps)))
+    read = _read(cells, where)
+    stamps = read.where(within_years(pd.DatetimeIndex(read)))
+    wrong = np.asarray(stamps.isna() & read.notna())
+    report.unreadable += int(stamps.isna().sum() - wrong.sum())
+    if wrong.any():
+        report.impossible += int(wrong.sum())
+        report.first_impossible = report.first_impossible or str(cells[wrong].iloc[0])
     if stamps.isna().all():
         advice = "write ISO 8601, such as 2023-07-06T07:10:00+02:00"
         raise PlanError(where, f"a column of {EXPECTED}", repr(cells.iloc[0]) if len(cells) else "nothing", advice)

@@ -7,15 +7,18 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.collections import PolyCollection
 from matplotlib.dates import AutoDateLocator
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, ScalarFormatter
 
 from mpc.reports.display import Display
 from mpc.reports.units import NUMBER, Line, converted_number, inch_pound
+from thermal._types import FloatArray
 
 #: Width of a figure on a phone [inch]: 374 px, which a screen of 390 px shows at about nine tenths.
 NARROW = 3.9
@@ -40,8 +43,15 @@ DARK = {
 #: Decimals of coordinates beyond a hundredth of a point, which no screen shows: a third of a page.
 _LONG = re.compile(r"(?<=[ LMCQ\"-])(\d+\.\d\d)\d+(?=[ \n\"LMCQ])")
 
+#: Blanks about the corners of a path, a fifth of a long one.
+_BETWEEN = re.compile(r" \n([LMCQ]) (?=[\d-])")
+
 #: How high a figure on a phone is against one of its axes before, for each of those below each other [-].
 _LOWER = 0.75
+
+#: Columns that lines are thinned to for each inch of a figure [1/inch]: of the 96 pixels an inch has on a screen axes
+#: take two thirds, and a column is at most two of these wide.
+_COLUMNS = 40
 
 _UNIT = re.compile(r"\[([^\]]+)\]")
 
@@ -182,6 +192,72 @@ def for_dark(svg: str) -> str:
         for what in ("fill", "stroke"):
             if f"{what}: {light}" in svg:
                 rules.append(f'[style*="{what}: {light}"]{{{what}:{dark}!important}}')
-    svg = _LONG.sub(r"\1", svg)
+    svg = _BETWEEN.sub(r"\1", _LONG.sub(r"\1", svg))
     at = svg.index(">") + 1
     return f"{svg[:at]}<style>@media (prefers-color-scheme: dark){{{''.join(rules)}}}</style>{svg[at:]}"
+
+
+def thin(figure: Figure, sharpness: float = 1.0) -> None:
+    """Leave out of long lines and bands over time what no screen shows: lowest and highest of each column stay.
+
+    An average would hide peaks; these stay where and as high as they are.
+
+    Parameters
+    ----------
+    figure : Figure
+        Changed; what is short in it stays as it is.
+    sharpness : float
+        Columns against those of a figure that stands still: above 1 for one that zooms [-].
+    """
+    columns = round(sharpness * _COLUMNS * float(figure.get_size_inches()[0]))
+    over_time = [axes for axes in figure.axes if isinstance(axes.xaxis.get_major_locator(), AutoDateLocator)]
+    for axes in over_time:
+        for artist in axes.get_children():
+            if isinstance(artist, Line2D) and artist.get_linestyle() != "None":
+                x, y = (np.asarray(values, dtype=float) for values in artist.get_data(orig=False))
+                if len(kept := kept_points(x, y, columns)) < len(x):
+                    artist.set_data(x[kept], y[kept])
+            elif isinstance(artist, PolyCollection):
+                corners = [np.asarray(path.vertices)[:-1] for path in artist.get_paths() if np.size(path.vertices)]
+                whole = float(np.ptp(np.concatenate([each[:, 0] for each in corners]))) if corners else 0.0
+                shares = [float(np.ptp(each[:, 0])) / max(whole, 1e-12) for each in corners]  # of parts between gaps
+                thinned = [_thinned_band(e, max(1, round(columns * s))) for e, s in zip(corners, shares, strict=True)]
+                if sum(map(len, thinned)) < sum(map(len, corners)):
+                    artist.set_verts(thinned)
+
+
+def _thinned_band(corners: FloatArray, columns: int) -> FloatArray:
+    """Corners of a band, there along one of its ends and back along the other, shape (n_kept, 2)."""
+    turn = int(np.argmax(corners[:, 0])) + 1
+    there, back = corners[:turn], corners[turn:][::-1]
+    ends = [part[kept_points(part[:, 0], part[:, 1], columns)] for part in (there, back)]
+    return np.concatenate([ends[0], ends[1][::-1]])
+
+
+def kept_points(x: FloatArray, y: FloatArray, columns: int) -> np.ndarray[Any, np.dtype[np.intp]]:
+    """Points of a line that show on so many columns of pixels: lowest and highest of each, its ends, and its gaps.
+
+    Parameters
+    ----------
+    x : ndarray, shape (n_points,)
+        Along the line; where it runs back anywhere, all points are kept [any].
+    y : ndarray, shape (n_points,)
+        Values, NaN in gaps [any].
+    columns : int
+        How many.
+
+    Returns
+    -------
+    ndarray, shape (n_kept,)
+        Indices, rising.
+    """
+    everything = np.arange(len(x))
+    if len(x) <= 2 * columns or not np.isfinite(x).all() or np.any(np.diff(x) < 0.0) or x[-1] <= x[0]:
+        return everything
+    column = np.minimum((x - x[0]) / (x[-1] - x[0]) * columns, columns - 1).astype(int)
+    gap = np.isnan(y)
+    order = np.lexsort((y, column, gap))  # those with a value first; by column, and within it from low to high
+    key = 2 * column[order] + gap[order]
+    change = np.flatnonzero(np.diff(key, prepend=-1, append=-1))
+    first, last = change[:-1], change[1:] - 1
+    return np.unique(np.concatenate([[0, len(x) - 1], order[first], order[last]]))

@@ -67,6 +67,7 @@ def zoomable(figure: Figure, shown: Display) -> dict[str, Any]:
             layout["annotations"].append(
                 place | {"text": f"<b>{shown.text(title)}</b>", "showarrow": False, "xanchor": "left"}
             )
+        layout["annotations"] += _words(axes, shown, tail, is_time)
         data += [trace | {"xaxis": f"x{tail}", "yaxis": f"y{tail}"} for trace in _traces(axes, shown, is_time)]
     layout["height"] = round(max(420.0, 80.0 * figure.get_size_inches()[1]))
     return {"data": data, "layout": layout}
@@ -88,6 +89,27 @@ def _shares(own: Sequence[Axes]) -> bool:
     return len(own) > 1 and own[0].get_shared_x_axes().joined(own[0], own[-1])
 
 
+def _words(axes: Axes, shown: Display, tail: str, is_time: bool) -> list[dict[str, Any]]:
+    """Text beside lines and bands, where these are."""
+    line = axis_line(axes.yaxis) if shown.converts else None
+    zone = getattr(axes.xaxis.get_major_locator(), "tz", None)
+    found = []
+    for text in axes.texts:
+        if text.get_transform() == axes.transData and text.get_text().strip():
+            at = np.asarray(text.get_position(), dtype=float)
+            x = (_times(at[:1], zone) if is_time else course_of(at[:1]))[0]
+            y = course_of([at[1] if line is None else line(float(at[1]))])[0]
+            place = {"x": x, "y": y, "xref": f"x{tail}", "yref": f"y{tail}", "xanchor": text.get_horizontalalignment()}
+            found.append(place | {"text": shown.text(text.get_text()), "showarrow": False})
+    return found
+
+
+def _times(values: Any, zone: Any) -> list[str]:
+    """Spell days of Matplotlib as local times."""
+    stamps = (num2date(v, tz=zone) for v in np.asarray(values, dtype=float))  # type: ignore[no-untyped-call]
+    return [stamp.strftime("%Y-%m-%d %H:%M") for stamp in stamps]
+
+
 def _traces(axes: Axes, shown: Display, is_time: bool) -> list[dict[str, Any]]:
     """Lines and bands of axes; lines without data, such as keys of a legend, are left out."""
     line = axis_line(axes.yaxis) if shown.converts else None
@@ -99,10 +121,7 @@ def _traces(axes: Axes, shown: Display, is_time: bool) -> list[dict[str, Any]]:
         return [float(f"{v:.{_DIGITS}g}") if np.isfinite(v) else None for v in numbers]
 
     def times(values: Any) -> list[Any]:
-        if not is_time:
-            return course_of(values)
-        stamps = (num2date(v, tz=zone) for v in np.asarray(values, dtype=float))  # type: ignore[no-untyped-call]
-        return [stamp.strftime("%Y-%m-%d %H:%M") for stamp in stamps]
+        return _times(values, zone) if is_time else course_of(values)
 
     traces = []
     for artist in axes.get_children():

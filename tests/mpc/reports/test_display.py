@@ -16,7 +16,7 @@ from calibration.results import write_results as write_whole
 from mpc.errors import MpcError
 from mpc.reports.display import Display, Displayed, display, showing, write_results
 from mpc.reports.figures import zoom
-from mpc.reports.figures.adapt import DARK
+from mpc.reports.figures.adapt import DARK, kept_points
 from mpc.reports.figures.style import INK, MEASURED, Picture, lines_over_time, panel, picture, styled
 from mpc.reports.glossary import words_on
 from mpc.reports.means import Means
@@ -149,6 +149,64 @@ def test_what_zooms_is_what_is_drawn() -> None:
     band, line = found["data"]
     assert band["fill"] == "toself" and line["name"] == "measured" and line["line"]["color"] == INK.lower()
     assert line["x"][0] == "2023-03-06 00:00" and line["x"][-1] == "2023-03-06 23:30" and line["y"][-1] == 21.0
+
+
+def drawn_y(uri: str) -> list[float]:
+    """Heights of the corners of the longest line of a drawing [pt]."""
+    lines = re.findall(r'<path d="(M [^"]*)"[^>]*style="fill: none', svg(uri))
+    return [float(y) for y in re.findall(r"[ML] ?[-\d.]+ ([-\d.]+)", max(lines, key=len))]
+
+
+@styled
+def long_course(values: np.ndarray, band: bool = False) -> Picture:
+    stamps = pd.date_range("2023-01-01", periods=len(values), freq="5min", tz="Etc/GMT+5")
+    figure, axes = panel(7.0, 2.5, ylabel="temperature [°C]")
+    x = lines_over_time(axes, stamps)
+    if band:
+        axes.fill_between(x, values - 1.0, values + 1.0, color=MEASURED, alpha=0.2)
+    axes.plot(x, values, color=INK, label="measured")
+    return picture(figure, "A quarter of a year", zoom=True)
+
+
+def test_a_long_course_is_thinned_and_its_peaks_stay() -> None:
+    values = 20.0 + np.random.default_rng(0).normal(0.0, 0.1, 25920)
+    values[7001], values[15003], values[20000:20400] = 27.0, 12.0, np.nan
+    found = long_course(values, band=True)
+    assert found.zoom is not None
+    *bands, line = found.zoom["data"]  # of each part between gaps
+    shown = [y for y in line["y"] if y is not None]
+    assert max(shown) == 27.0 and min(shown) == 12.0 and None in line["y"] and len(line["y"]) < 3000
+    assert line["x"][line["y"].index(27.0)] == "2023-01-25 07:25"  # the stamp of the spike itself
+    assert (line["x"][0], line["x"][-1]) == ("2023-01-01 00:00", "2023-03-31 23:55")
+    assert len(bands) == 2
+    assert max(max(band["y"]) for band in bands) == 28.0 and sum(len(band["y"]) for band in bands) < 6000
+    for uri in (found.source, found.narrow):
+        heights = drawn_y(uri)
+        assert len(heights) < 2000 and np.ptp(heights) > 8.0 * np.ptp(np.percentile(heights, [5.0, 95.0]))
+
+
+def test_a_short_course_keeps_every_point() -> None:
+    values = 20.0 + np.random.default_rng(0).normal(0.0, 0.1, 288)
+    found = long_course(values).zoom
+    assert found is not None and found["data"][0]["y"] == pytest.approx(values, rel=1e-4)
+    there_and_back = np.r_[np.linspace(0.0, 1.0, 50), np.linspace(1.0, 0.0, 50)]
+    assert len(kept_points(there_and_back, np.zeros(100), 5)) == 100
+
+
+def test_names_beside_lines_zoom_with_them() -> None:
+    @styled
+    def named() -> Picture:
+        figure, axes = panel(7.0, 2.5, ylabel="temperature [°C]")
+        x = lines_over_time(axes, STAMPS)
+        axes.plot(x, np.full(48, 20.0))
+        axes.text(x[2], 20.0, "valve leaks", ha="right")
+        return picture(figure, "Named", zoom=True)
+
+    with showing(Display(units="ip")):
+        found = named().zoom
+    assert found is not None
+    (told,) = found["layout"]["annotations"]
+    assert (told["text"], told["x"], told["y"], told["xanchor"]) == ("valve leaks", "2023-03-06 01:00", 68.0, "right")
 
 
 def test_a_page_says_what_it_means_and_explains_its_words() -> None:

@@ -207,6 +207,24 @@ def test_a_logger_that_does_not_change_its_clock_is_named(house: Path, tmp_path:
     assert "it stands there once" in " ".join(found.remarks)
 
 
+@pytest.mark.parametrize("stamp", ["9999-12-31T23:50:00-05:00", "1600-01-01T00:00:00Z"])
+def test_a_row_of_an_impossible_year_among_good_ones_is_left_out_and_told(
+    house: Path, tmp_path: Path, stamp: str
+) -> None:
+    frame = table("5min", tz="UTC")
+    frame.to_csv(tmp_path / "good.csv", index=False)
+    frame["time"] = frame["time"].map(lambda time: time.isoformat())
+    frame.loc[[40, 41], "time"] = stamp
+    frame.loc[42, "time"] = None
+    frame.to_csv(tmp_path / "t.csv", index=False)
+    good, found = (import_telemetry(load_building(house), str(tmp_path / name)) for name in ("good.csv", "t.csv"))
+    told = [remark for remark in found.remarks if "1900 to 2199" in remark]
+    assert len(told) == 1 and told[0].startswith(f"2 rows are not time stamps of the years 1900 to 2199 (first {stamp})")
+    assert "1 rows without a time stamp that can be read were left out" in found.remarks
+    lost = good.telemetry.frame[ROOM].notna() & found.telemetry.frame[ROOM].isna()
+    assert lost.sum() == 3 and found.telemetry.frame.index.equals(good.telemetry.frame.index)
+
+
 @pytest.mark.parametrize(
     ("change", "settings", "error", "text"),
     [

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 import yaml
 
-from mpc.adapters.described.load import READY
+from mpc.adapters.described.read import READY
 from mpc.adapters.described.schema import PlantFile
 from mpc.adapters.described.seen import seen_scenario
 from mpc.errors import PlantError
