@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import pandas as pd
 import typer
 
 from calibration.errors import CalibrationError
@@ -73,6 +72,8 @@ class How:
         """Longest time of a case [s]."""
         if self.limit is None:
             return None
+        import pandas as pd
+
         try:
             seconds = pd.Timedelta(self.limit).total_seconds()
         except ValueError as error:

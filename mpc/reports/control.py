@@ -10,10 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from calibration.results import Content, write_results
+from calibration.results import Content
 from mpc.kpi.kpis import Kpis
 from mpc.reports.assumptions import assumption_rows
 from mpc.reports.comparison import comparison_table
+from mpc.reports.display import write_results
 from mpc.reports.figures.control import cost_bars, course, expectations, side_by_side
 from mpc.reports.figures.style import CELSIUS
 from mpc.reports.means import NOTICED, comparison_means, control_means

@@ -270,7 +270,7 @@ def test_a_folder_of_cases_reports_each(spoilt: Path, tmp_path: Path) -> None:
     assert cases["spoilt"]["error"] == "CaseError"
     assert cases["whole"]["solver"]["success"] is True
     assert "error: spoilt: CaseError" in answer.stderr
-    assert sorted(p.name for p in out.iterdir()) == ["fleet.parquet", "report.html", "summary.json", "whole"]
+    assert sorted(p.name for p in out.iterdir()) == ["fleet.parquet", "report.html", "summary.json", "tables", "whole"]
     assert (out / "whole" / "report.html").is_file()
     shutil.rmtree(spoilt.parent / "whole")
     answer = run("calibrate", spoilt.parent, "--out", tmp_path / "none")

@@ -89,12 +89,14 @@ def test_a_guard_of_the_command_gives_back_and_listens(tmp_path: Path) -> None:
     device = module.SimulatedSite(100.0)
     path = make(tmp_path, device.start(), "advise")
     device.operate(1, 22.0, 13)  # what a guard left that was killed
+    end = time.monotonic() + 60.0
+    while not device.held(13) and time.monotonic() < end:
+        time.sleep(0.02)
     guard = subprocess.Popen(
         [sys.executable, "-m", "mpc.cli", "operate", str(path), "--part", "guard"], cwd=tmp_path,
         env=os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])},
     )  # fmt: skip
     try:
-        end = time.monotonic() + 60.0
         while device.held(13) and time.monotonic() < end:
             time.sleep(0.02)
         assert device.held(13) == {}

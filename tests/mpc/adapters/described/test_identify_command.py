@@ -96,7 +96,7 @@ def test_what_commands_refuse(tmp_path: Path, make_house: Callable[..., Path]) -
         (("control", plant, "--model", tmp_path), "a folder with model.json"),
         (("control", plant, "--violations", "much"), "--violations: expected a share such as 5%"),
         (("control", plant, "--start", "2023-01-16"), "--start and --end, or neither"),
-        (("control", tmp_path), "--start and --end, found None and None"),
+        (("control", tmp_path), "expected the description of the building, found no such file"),
         (("identify", plant, "--actuators", "pump/on"), "actuators: expected one of the plant, found 'pump/on'"),
         (("identify", plant, "--start", "soon"), "--start: expected a local time"),
         (("identify", plant, "--telemetry", plant), "expected a .parquet or .csv file"),
