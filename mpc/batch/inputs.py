@@ -109,6 +109,20 @@ class DrivingRows:
                 part, values = self.parts[name], own[name]
                 self._own[member, : len(values), part.start - self._common : part.stop - self._common] = values
 
+    def put(self, parts: Mapping[str, FloatArray]) -> None:
+        """Let the first steps of the first plant, and of all members, have other values.
+
+        Parameters
+        ----------
+        parts : mapping of str to ndarray, shape (n_steps, width)
+            What is replaced [any].
+        """
+        for name, values in parts.items():
+            part, n = self.parts[name], len(values)
+            self._rows[:n, part] = values
+            if self._own is not None and name in self._names:
+                self._own[:, :n, part.start - self._common : part.stop - self._common] = values
+
     def fill(self, steps: IntArray, out: Array) -> None:
         """Fill in the rows of a step of each member.
 
