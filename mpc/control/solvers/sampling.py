@@ -37,7 +37,7 @@ class CrossEntropy:
     smoothing : float
         Share of the new mean and deviation beside the old ones [-], against narrowing too soon.
     tolerance : float
-        Rounds end when one brings less than this share of the cost [-].
+        Rounds end when two in a row bring less than this share of the cost each [-].
 
     Raises
     ------
@@ -84,7 +84,7 @@ class CrossEntropy:
             The cheapest of all.
         """
         mean, spread = np.array(start, dtype=float), np.full(start.shape, self.deviation)
-        best, lowest, first, done, converged = mean, np.inf, np.inf, 0, False
+        best, lowest, first, done, slow, converged = mean, np.inf, np.inf, 0, 0, False
         kept = max(round(self.elite * self.samples), 2)
         for done in range(1, self.rounds + 1):
             tried = np.clip(mean + spread * rng.standard_normal((self.samples, mean.size)), 0.0, 1.0)
@@ -100,7 +100,8 @@ class CrossEntropy:
             elite, share = tried[order[:kept]], self.smoothing
             mean = share * elite.mean(axis=0) + (1.0 - share) * mean
             spread = share * elite.std(axis=0) + (1.0 - share) * spread
-            converged = done > 1 and bool(gained <= self.tolerance * abs(lowest))
+            slow = slow + 1 if gained <= self.tolerance * abs(lowest) else 0
+            converged = slow == 2
             if converged or time.perf_counter() > deadline:
                 break
         return Minimum(best, lowest, first, done, converged)
@@ -118,7 +119,7 @@ class Minimum(NamedTuple):
     rounds : int
         That were made.
     converged : bool
-        Whether the last round brought too little to go on.
+        Whether the last rounds brought too little to go on.
     """
 
     decisions: FloatArray
