@@ -96,11 +96,12 @@ class HorizonRollouts:
         """Give what drives the members, as `mpc.batch.inputs.plant_rows` names it."""
         outside = data.boundary.copy()
         outside[:, : len(self.batch.plants[0].model.network.boundaries)] -= REFERENCE_TEMPERATURE
-        idle = (data.running.min(axis=1, keepdims=True) < 1.0) * 1.0 if data.running.size else np.zeros((len(outside), 1))
+        running = data.running if data.running.size else np.ones((len(outside), 1))
         return {
             "heating": data.heating_setpoint - REFERENCE_TEMPERATURE,
             "cooling": data.cooling_setpoint - REFERENCE_TEMPERATURE,
-            "running": data.running, "some_idle": idle, "ventilation": data.ventilation[:, :1],
+            "running": data.running, "some_idle": (running.min(axis=1, keepdims=True) < 1.0) * 1.0,
+            "ventilation": data.ventilation[:, :1],
             "outdoor": data.outdoor_temperature[:, None], "outside": outside,
             "gains": data.gains + self.problem.predictor.fading[:, None] * data.disturbance,
         }  # fmt: skip

@@ -128,7 +128,7 @@ class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.layout = ObservationLayout(first.columns, first.actuators, area, outlook, histograms, ranges)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (len(self.actions),), np.float32)
         self.observation_space = gymnasium.spaces.Box(-LARGEST, LARGEST, (len(self.layout),), np.float32)
-        self._plant, self._course, self._step, self._done = first, self.courses[0], 0, 0
+        self._plant, self._course, self._step, self._done, self._begun = first, self.courses[0], 0, 0, False
         self._ahead: FloatArray | None = None
 
     def reset(
@@ -161,7 +161,7 @@ class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
         known, expected = range(len(self.plants)), f"a plant from 0 to {len(self.plants) - 1}"
         MpcError.unless(info["plant"] in known, "options: plant", expected, repr(info["plant"]))
         self._plant, self._course = self.plants[info["plant"]], self.courses[info["plant"]]
-        self._step = self._done = 0
+        self._step, self._done, self._begun = 0, 0, True
         if self._traced is not None:
             values = self._traced.reset(info["plant"], info["plant_seed"])
             return self._observe(values, int(self._plant.scenario.grid.edges[0])), info
@@ -201,8 +201,8 @@ class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     @property
     def plant(self) -> ScenarioPlant:
-        """The plant of this episode. Where its equations are traced it is brought to where the episode is when asked for."""
-        return self._plant if self._traced is None or not self._done else self._traced.plant()
+        """The plant of this episode, where the episode is: one whose equations are traced makes up for its steps."""
+        return self._plant if not self._begun or self._traced is None else self._traced.plant()
 
     @cached_property
     def _traced(self) -> TracedPlant | None:

@@ -1,4 +1,4 @@
-"""Plants of ours as an environment steps them: by their equations, traced once, in the place of one call after another."""
+"""Plants of ours as an environment steps them: by their equations, traced once."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""Controllers by name: three rules, optimal control with and without derivatives, the perfect bound, and those that others register."""
+"""Controllers by name: rules, optimal control with and without derivatives, the perfect bound, those of others."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -128,8 +128,8 @@ def find_controller(name: str, subject: Subject = "any") -> RegisteredController
     Parameters
     ----------
     name : str
-        ``mpc``, ``schedule``, ``reset``, ``guideline36``, ``bound``, ``sampling``, or one that was registered; of described plants
-        ``mpc``, ``full_speed`` or ``own``.
+        ``mpc``, ``schedule``, ``reset``, ``guideline36``, ``bound``, ``sampling``, or one that was registered; of
+        described plants ``mpc``, ``full_speed`` or ``own``.
     subject : str
         What it shall run on.
 

@@ -20,7 +20,8 @@ from thermal.batch.trace import Reduce, Take, copied, where
 _OPERATIONS: dict[Any, Callable[..., Any]] = {
     np.add: operator.add, np.subtract: operator.sub, np.multiply: operator.mul, np.divide: operator.truediv,
     np.negative: operator.neg, np.absolute: ca.fabs, np.sqrt: ca.sqrt, np.exp: ca.exp, np.log: ca.log,
-    np.expm1: ca.expm1, np.log1p: ca.log1p, np.arctan: ca.atan, np.tanh: ca.tanh, np.floor: ca.floor, np.power: ca.power, np.maximum: ca.fmax, np.minimum: ca.fmin,
+    np.expm1: ca.expm1, np.log1p: ca.log1p, np.arctan: ca.atan, np.tanh: ca.tanh,
+    np.floor: ca.floor, np.power: ca.power, np.maximum: ca.fmax, np.minimum: ca.fmin,
     np.rint: lambda x: x - ca.remainder(x, 1.0),  # exact, halves to the even one as NumPy has it
     np.greater: operator.gt, np.greater_equal: operator.ge, np.less: operator.lt, np.less_equal: operator.le,
     np.equal: operator.eq, np.not_equal: operator.ne, np.bitwise_and: ca.logic_and, np.logical_and: ca.logic_and,
@@ -83,9 +84,10 @@ class _Unrolled:
         places = np.array([k for k in sorted(self._written) if looked_at[k]], dtype=np.intp)
         results, work = np.zeros(len(places)), self._work
         whole = ca.Function("run", [self._memory], [ca.vertcat(*(self._written[k] for k in places.tolist()))])
-        buffer, trigger = whole.buffer()
-        buffer.set_arg(0, memoryview(work))
-        buffer.set_res(0, memoryview(results))
+        made: Any = whole.buffer()
+        buffer, trigger = made
+        buffer.set_arg(0, memoryview(work))  # type: ignore[arg-type]
+        buffer.set_res(0, memoryview(results))  # type: ignore[arg-type]
 
         def run(_: Any = (whole, buffer)) -> None:
             trigger()

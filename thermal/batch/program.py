@@ -87,7 +87,8 @@ class Program:
         for mask, arrays in zip(masks, (self._constants.values(), looked_at), strict=True):
             for array in arrays:
                 mask[places_of(self._work, array)] = True
-        return machine_runs(self._work[: self._end], *masks, [steps for fits, steps in parts if fits])
+        constant, wanted = masks
+        return machine_runs(self._work[: self._end], constant, wanted, [steps for fits, steps in parts if fits])
 
     def _laid_out(
         self, tape: Tape, notes: Sequence[Instruction]

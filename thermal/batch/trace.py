@@ -255,6 +255,7 @@ class Reduce(NamedTuple):
     axis: int
 
     def __call__(self, values: FloatArray, out: FloatArray) -> None:
+        """Carry it out; see `Instruction`."""
         self.function.reduce(values, axis=self.axis, out=out)
 
 
@@ -270,6 +271,7 @@ class Take(NamedTuple):
     rows: tuple[int, ...]
 
     def __call__(self, values: FloatArray, out: FloatArray) -> None:
+        """Carry it out; see `Instruction`."""
         np.take(values, self.rows, axis=0, out=out, mode="clip")
 
 
