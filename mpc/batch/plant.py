@@ -193,13 +193,13 @@ class BatchedPlant:
         hvac, off = plant.loop.hvac.start(**states), (False,) * len(plant.system.air_handlers)
         self._rows.put(inputs)
         self.plant_of[:], self.now[:], self._started, self._history = 0, 0, True, self._blank()
-        self._set_out(0, np.arange(self.members), LoopState((state, reading), hvac, off, reading, np.zeros(len(reading))))
+        begun = LoopState((state, reading), hvac, off, reading, np.zeros(len(reading)))
+        self._set_out(0, np.arange(self.members), begun)
 
     def _blank(self) -> tuple[Array, Array] | None:
         n, steps, members = len(self.plants[0].zone_names), self._longest, self.members
-        if not self._recording:
-            return None
-        return np.zeros((steps + 1, n, members), self.dtype), np.zeros((steps, 2, members), self.dtype)
+        zones, powers = (steps + 1, n, members), (steps, 2, members)
+        return (np.zeros(zones, self.dtype), np.zeros(powers, self.dtype)) if self._recording else None
 
     def _start(self, number: int, who: IntArray) -> None:
         plant, index = self.plants[number], who.tolist()
