@@ -11,8 +11,6 @@ from mpc.loop.simulated import SimulatedPlant
 from thermal._types import FloatArray, IntArray
 from thermal.units import REFERENCE_TEMPERATURE
 
-_TOGETHER = 32  # members whose noise is laid out together, so that what is drawn stays in the cache
-
 
 def plant_rows(plant: SimulatedPlant) -> dict[str, FloatArray]:
     """Lay out what drives a plant, a row a step; temperatures of zones are counted from the reference temperature.
@@ -109,6 +107,20 @@ class DrivingRows:
                 part, values = self.parts[name], own[name]
                 self._own[member, : len(values), part.start - self._common : part.stop - self._common] = values
 
+    def put(self, parts: Mapping[str, FloatArray]) -> None:
+        """Let the first steps of the first plant, and of all members, have other values.
+
+        Parameters
+        ----------
+        parts : mapping of str to ndarray, shape (n_steps, width)
+            What is replaced [any].
+        """
+        for name, values in parts.items():
+            part, n = self.parts[name], len(values)
+            self._rows[:n, part] = values
+            if self._own is not None and name in self._names:
+                self._own[:, :n, part.start - self._common : part.stop - self._common] = values
+
     def fill(self, steps: IntArray, out: Array) -> None:
         """Fill in the rows of a step of each member.
 
@@ -144,8 +156,8 @@ class DrawnNoise:
     def __init__(self, source: NoiseSource, members: int, dtype: Any) -> None:
         self.source, self._seeds = source, np.zeros(members, dtype=np.int64)
         self._numbers = np.full(members, -1, dtype=np.int64)
-        self._drawn = np.zeros((BLOCK, source.width, members), dtype=dtype)
-        self._few = np.zeros((_TOGETHER, BLOCK * source.width), dtype=dtype)
+        # as it is drawn; turning a step to columns when it is needed is cheaper than turning all that was drawn
+        self._drawn = np.zeros((members, BLOCK, source.width), dtype=dtype)
         self._members = np.arange(members)
 
     def begin(self, member: int, seed: int) -> None:
@@ -172,16 +184,11 @@ class DrawnNoise:
         if (stale := np.flatnonzero(numbers != self._numbers)).size:
             self._draw(stale, numbers)
         if rows[0] == rows[-1] and (rows == rows[0]).all():
-            np.copyto(out, self._drawn[rows[0]])
+            np.copyto(out, self._drawn[:, rows[0]].T)
         else:
-            np.copyto(out, self._drawn[rows, :, self._members].T)
+            np.copyto(out, self._drawn[self._members, rows].T)
 
     def _draw(self, members: IntArray, numbers: IntArray) -> None:
-        for part in (members[k : k + _TOGETHER] for k in range(0, len(members), _TOGETHER)):
-            seeds = self._seeds[part].tolist()
-            for row, (number, seed) in enumerate(zip(numbers[part].tolist(), seeds, strict=True)):
-                self._few[row] = self.source.block(number, seed).ravel()
-            columns = self._drawn.reshape(-1, self._drawn.shape[-1])
-            together = part[0] + len(part) - 1 == part[-1]
-            columns[:, slice(part[0], part[-1] + 1) if together else part] = self._few[: len(part)].T
+        for member in members.tolist():
+            self._drawn[member] = self.source.block(int(numbers[member]), int(self._seeds[member]))
         self._numbers[members] = numbers[members]

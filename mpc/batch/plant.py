@@ -1,6 +1,6 @@
 """Many plants of one structure, stepped together."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from mpc.batch.inputs import DrawnNoise, DrivingRows, people_rows, plant_rows
 from mpc.batch.step import Score, TracedStep
 from mpc.errors import PlantActionError, PlantError
 from mpc.kpi.record import PlantRecord
+from mpc.loop.loop import LoopState
 from mpc.loop.plant import need_running
 from mpc.loop.reduced import ReducedBuilding
 from mpc.loop.simulated import SimulatedPlant
@@ -160,19 +161,60 @@ class BatchedPlant:
         PlantError.unless(valid, "reset", expected, "others")
         together = self._rows.each or len(who) == self.members
         PlantError.unless(together, "reset", "all members of one plant at once", f"{len(who)} of {self.members}")
-        if self._recording and (self._history is None or len(who) == self.members):
-            n = len(self.plants[0].zone_names)
-            self._history = (np.zeros((self._longest + 1, n, self.members), self.dtype),
-                             np.zeros((self._longest, 2, self.members), self.dtype))  # fmt: skip
+        if self._history is None or len(who) == self.members:
+            self._history = self._blank()
         self.plant_of[who], self.seeds[who], self.now[who], self._started = which, seed, 0, True
         for number in np.unique(which).tolist():
             self._start(number, who[which == number])
         return self.measured
 
+    def start(self, modal_state: FloatArray, inputs: Mapping[str, FloatArray], **states: float) -> None:
+        """Start all members of the first plant from an estimated state, with inputs of a horizon in place of its own.
+
+        Parameters
+        ----------
+        modal_state : ndarray, shape (order,)
+            Modes of its building, as an observer has them [K].
+        inputs : mapping of str to ndarray, shape (n_steps, width)
+            Parts of `mpc.batch.inputs.plant_rows`, as there.
+        **states : float
+            Of the HVAC system, as `HvacSystem.start` takes them [unit of the state].
+
+        Raises
+        ------
+        PlantError
+            When the state is of another building.
+        """
+        plant, model = self.plants[0], self.plants[0].model
+        order = model.order if isinstance(model, ReducedBuilding) else 0
+        PlantError.unless(modal_state.shape == (order,), "state", f"one of order {order}", f"{modal_state.shape}")
+        state = model.counted(modal_state)  # type: ignore[attr-defined]
+        reading = model.step_matrices()[3] @ state + REFERENCE_TEMPERATURE  # type: ignore[attr-defined]
+        hvac, off = plant.loop.hvac.start(**states), (False,) * len(plant.system.air_handlers)
+        self._rows.put(inputs)
+        self.plant_of[:], self.now[:], self._started, self._history = 0, 0, True, self._blank()
+        begun = LoopState((state, reading), hvac, off, reading, np.zeros(len(reading)))
+        self._set_out(0, np.arange(self.members), begun)
+
+    def _blank(self) -> tuple[Array, Array] | None:
+        n, steps, members = len(self.plants[0].zone_names), self._longest, self.members
+        zones, powers = (steps + 1, n, members), (steps, 2, members)
+        return (np.zeros(zones, self.dtype), np.zeros(powers, self.dtype)) if self._recording else None
+
     def _start(self, number: int, who: IntArray) -> None:
         plant, index = self.plants[number], who.tolist()
         warm, last = plant.warmed_up()
-        state, _ = warm.building
+        self._set_out(number, who, warm)
+        for member in index:
+            seed = int(self.seeds[member])
+            scenario = plant.given.redrawn(seed) if self._random_people else plant.given
+            self._rows.begin(member, number, people_rows(plant, scenario) if self._random_people else None)
+            if self._noise is not None:
+                self._noise.begin(member, seed)
+            self.measured[:, member] = plant.sensors.read(last, scenario.occupancy[last.number], seed)
+
+    def _set_out(self, number: int, who: IntArray, warm: LoopState) -> None:
+        plant, (state, _) = self.plants[number], warm.building
         self._building.start(who, np.full(len(who), self._model_of[number]), [state] * (self._model_of[number] + 1))
         columns = {
             "reading": warm.reading - REFERENCE_TEMPERATURE, "missed": warm.missed,
@@ -187,13 +229,6 @@ class BatchedPlant:
         self._of("zone")[:, who] = air[:, None]
         if self._history is not None:
             self._history[0][0][:, who] = air[:, None]
-        for member in index:
-            seed = int(self.seeds[member])
-            scenario = plant.given.redrawn(seed) if self._random_people else plant.given
-            self._rows.begin(member, number, people_rows(plant, scenario) if self._random_people else None)
-            if self._noise is not None:
-                self._noise.begin(member, seed)
-            self.measured[:, member] = plant.sensors.read(last, scenario.occupancy[last.number], seed)
 
     def step(self, setpoints: Array, idle: NDArray[np.bool_] | None = None) -> Array:
         """Hold setpoints for a step of the plants.

@@ -12,11 +12,12 @@ from mpc.environment.features import BLOCK_ENDS, LARGEST, Outlook, clock
 from mpc.environment.layout import SUPPLY_SETPOINTS, ActionLayout, Observation, ObservationLayout
 from mpc.environment.render import RenderedRun
 from mpc.environment.reward import REWARDS, Reward
+from mpc.environment.traced import TracedPlant, traced
 from mpc.errors import MpcError
 from mpc.kpi.kpis import measure_kpis
 from mpc.kpi.record import PlantRecord
 from mpc.loop.history import RecentSteps
-from mpc.loop.plant import Measurements, Plant
+from mpc.loop.plant import Plant
 from mpc.scenario.forecast import Forecaster
 from mpc.scenario.scenario import Scenario
 from thermal._types import FloatArray
@@ -127,9 +128,7 @@ class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.layout = ObservationLayout(first.columns, first.actuators, area, outlook, histograms, ranges)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (len(self.actions),), np.float32)
         self.observation_space = gymnasium.spaces.Box(-LARGEST, LARGEST, (len(self.layout),), np.float32)
-        #: The plant of this episode.
-        self.plant = first
-        self._course, self._step, self._done = self.courses[0], 0, 0
+        self._plant, self._course, self._step, self._done, self._begun = first, self.courses[0], 0, 0, False
         self._ahead: FloatArray | None = None
 
     def reset(
@@ -161,9 +160,13 @@ class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
         info: dict[str, Any] = {**drawn, **(options or {})}
         known, expected = range(len(self.plants)), f"a plant from 0 to {len(self.plants) - 1}"
         MpcError.unless(info["plant"] in known, "options: plant", expected, repr(info["plant"]))
-        self.plant, self._course = self.plants[info["plant"]], self.courses[info["plant"]]
-        self._step = self._done = 0
-        return self._observe(self.plant.reset(info["plant_seed"])), info
+        self._plant, self._course = self.plants[info["plant"]], self.courses[info["plant"]]
+        self._step, self._done, self._begun = 0, 0, True
+        if self._traced is not None:
+            values = self._traced.reset(info["plant"], info["plant_seed"])
+            return self._observe(values, int(self._plant.scenario.grid.edges[0])), info
+        seen = self._plant.reset(info["plant_seed"])
+        return self._observe(seen.values_array, seen.seconds), info
 
     def step(self, action: NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Hold an action for a control step.
@@ -179,15 +182,32 @@ class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
             Observation, reward, whether the episode terminated (never) and was truncated, and its indicators at the
             end.
         """
-        plant, course, begin = self.plant, self._course, self._step
-        seen = plant.step(self.actions.setpoints(action))
+        plant, course, begin, setpoints = self._plant, self._course, self._step, self.actions.setpoints(action)
         self._step, self._done = begin + course.each, self._done + 1
-        reward = self.reward.of_steps(_last_steps(plant, course), plant.scenario, begin)
-        truncated = plant.finished or self._step + course.each > course.last or self._done == self.episode_steps
+        if self._traced is not None:
+            (values, reward), finished = self._traced.step(setpoints), False
+            seconds = int(plant.scenario.grid.edges[self._step])
+        else:
+            seen = plant.step(setpoints)
+            values, seconds, finished = seen.values_array, seen.seconds, plant.finished
+            reward = self.reward.of_steps(_last_steps(plant, course), plant.scenario, begin)
+        truncated = finished or self._step + course.each > course.last or self._done == self.episode_steps
         info: dict[str, Any] = {}
         if truncated:
-            info["kpis"] = measure_kpis(plant.record(), plant.scenario, control_step=plant.control_step).to_dict()
-        return self._observe(seen, truncated), reward, False, truncated, info
+            scenario = plant.scenario if self._traced is None else self._traced.scenario
+            found = measure_kpis(self._record(), scenario, control_step=plant.control_step)
+            info["kpis"] = found.to_dict()
+        return self._observe(values, seconds, truncated), reward, False, truncated, info
+
+    @property
+    def plant(self) -> ScenarioPlant:
+        """The plant of this episode, where the episode is: one whose equations are traced makes up for its steps."""
+        return self._plant if not self._begun or self._traced is None else self._traced.plant()
+
+    @cached_property
+    def _traced(self) -> TracedPlant | None:
+        known = all(course.outlook is None or course.forecaster is not None for course in self.courses)
+        return traced(self.plants, self.reward, self.actions.names) if known else None
 
     @property
     def observation_names(self) -> tuple[str, ...]:
@@ -203,24 +223,25 @@ class ControlEnvironment(gymnasium.Env[Observation, NDArray[np.float32]]):
         """Show the plant as `render_mode` says; None without one."""
         if self.render_mode is None:
             return None
-        run = RenderedRun(self.plant.zone_names, self.plant.scenario, self._last_record(), self._step)
+        plant = self._plant
+        run = RenderedRun(plant.zone_names, plant.scenario, self._record() if self._done else None, self._step)
         return run.table() if self.render_mode == "ansi" else run.picture()
 
-    def _last_record(self) -> PlantRecord | None:
-        return self.plant.record() if self._done else None
+    def _record(self) -> PlantRecord:
+        return self._plant.record() if self._traced is None else self._traced.record()
 
     def close(self) -> None:
         """Close the plants that hold something open, such as a process of EnergyPlus."""
         for plant in self.plants:
             getattr(plant, "close", lambda: None)()
 
-    def _observe(self, seen: Measurements, ended: bool = False) -> Observation:
+    def _observe(self, values: FloatArray, seconds: int, ended: bool = False) -> Observation:
         course = self._course
         if course.ahead is not None:
             self._ahead = course.ahead[min(self._step, len(course.ahead) - 1)]
         elif course.outlook is not None and not ended:  # at its end a plant may have nothing left to forecast
-            self._ahead = course.outlook.of_forecast(self.plant.forecast())
-        return self.layout.observe(seen.values_array, self._ahead, clock(seen.seconds, course.timezone))
+            self._ahead = course.outlook.of_forecast(self._plant.forecast())
+        return self.layout.observe(values, self._ahead, clock(seconds, course.timezone))
 
 
 def draw_episode(rng: np.random.Generator, plants: int) -> dict[str, int]:

@@ -154,7 +154,8 @@ class ObservationLayout:
         place = 0
         for run in self._runs:  # slices, as picking rows would copy them
             end = place + run.stop - run.start
-            scaled = values[run] * self._factor[place:end, None].astype(values.dtype)
+            scaled = seen[place:end] if values.dtype == seen.dtype else np.empty_like(values[run])
+            np.multiply(values[run], self._factor[place:end, None].astype(values.dtype), out=scaled)
             np.add(scaled, self._offset[place:end, None].astype(values.dtype), out=seen[place:end], casting="same_kind")
             place = end
         begin = measured
@@ -164,9 +165,9 @@ class ObservationLayout:
             seen[begin : begin + len(edges) + 1] = counts / at.size
             begin += len(edges) + 1
         own = seen[:counted]
-        if not np.isfinite(own.sum(dtype=np.float64)):
+        if not np.isfinite(own.sum()):
             own[~np.isfinite(own)] = 0.0
-        np.minimum(np.maximum(own, np.float32(-LARGEST), out=own), np.float32(LARGEST), out=own)
+        np.clip(own, np.float32(-LARGEST), np.float32(LARGEST), out=own)
         if ahead is not None:
             np.clip(ahead, -LARGEST, LARGEST, out=seen[counted:forecast], casting="same_kind")
         seen[forecast:] = now

@@ -65,6 +65,16 @@ class ReducedBuilding:
         """Modes of the building's model, from `REFERENCE_TEMPERATURE` on, shape (order,) [K]."""
         return self._scale * self._state
 
+    def counted(self, modal_state: FloatArray) -> FloatArray:
+        """Give the state here of modes, the inverse of `modal_state`, shape (order,) [K].
+
+        Parameters
+        ----------
+        modal_state : ndarray, shape (order,)
+            As an observer estimates it [K].
+        """
+        return np.asarray(modal_state / self._scale)
+
     def step_matrices(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
         """Give what `begin` and `finish` step with: end, driving, heating, output and response of the states here."""
         return self._end, self._driving.T, self._heating, self._output, self._response

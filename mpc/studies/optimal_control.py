@@ -8,6 +8,7 @@ import numpy as np
 from calibration.estimation.disturbance import DisturbanceModel
 from calibration.estimation.kalman import KalmanFilter
 from calibration.estimation.state_space import StateSpace, state_space
+from mpc.batch.rollouts import HorizonRollouts
 from mpc.control.controller.controller import MpcController
 from mpc.control.controller.observer import Observer
 from mpc.control.controller.site import ControllerSettings, SitePoints
@@ -16,11 +17,13 @@ from mpc.control.predictor.predictor import Predictor
 from mpc.control.problem.channels import Channel
 from mpc.control.problem.horizon import Horizon
 from mpc.control.problem.problem import ControlProblem
+from mpc.control.solvers.sampling import CrossEntropy, SamplingSolver
 from mpc.control.solvers.sequential import SequentialSolver
 from mpc.control.solvers.uncertainty import Margin
 from mpc.errors import ControlError
 from mpc.loop.actuators import SUPPLY_AIR, SUPPLY_WATER, Actuator, need_actuator
 from mpc.loop.plant import Plant
+from mpc.loop.reduced import ReducedBuilding
 from mpc.loop.sensors import PlantDevices
 from mpc.loop.simulated import SimulatedPlant
 from mpc.scenario.scenario import zone_areas
@@ -71,6 +74,64 @@ def default_horizon(control_step: float = 900.0, hours: float = 12.0) -> Horizon
     early = [0.5, 0.5, 0.5, 0.5, 1.0, 1.0, 1.0, 2.0, 2.0]
     late = [4.0] * int(max(hours - sum(early) - 3.0, 1.0) / 4.0)
     return Horizon.growing([(1.0, fine), (hours - 1.0, 900.0)], [*early, *late, 3.0], control_step)
+
+
+def sampled_horizon(control_step: float = 900.0, hours: float = 12.0) -> Horizon:
+    """Look half a day ahead in equal steps, a control step each, in few blocks: each is two decisions to be sampled.
+
+    Parameters
+    ----------
+    control_step : float
+        Time between two actions [s], that half an hour is whole multiples of.
+    hours : float
+        Length [h], from 3 on.
+    """
+    fits = hours >= 3.0 and control_step > 0.0 and 1800.0 % control_step == 0.0
+    ControlError.unless(fits, "horizon", "steps that divide half an hour, 3 hours or more", f"{control_step:g} s")
+    blocks = [0.5, 0.5, 1.0, 2.0, 2.0, *[3.0] * int((hours - 6.0) // 3.0)]
+    return Horizon.growing([(hours, control_step)], blocks, control_step)
+
+
+def make_sampling_controller(
+    model: ReducedModel,
+    plant: SimulatedPlant,
+    *,
+    settings: ControllerSettings | None = None,
+    observer: Observer | DisturbanceModel | None = None,
+    hours: float = 12.0,
+    method: CrossEntropy | None = None,
+    seed: int = 0,
+) -> MpcController:
+    """Make a controller that tries many plans at once on a batched plant, in the place of derivatives.
+
+    Parameters
+    ----------
+    model : ReducedModel
+        Of the building, as in `make_controller`.
+    plant : SimulatedPlant
+        Whose setpoints are to be chosen; its HVAC system is taken for known.
+    settings : ControllerSettings, optional
+        As in `make_controller`.
+    observer : Observer or DisturbanceModel, optional
+        As in `make_controller`.
+    hours : float
+        How far it looks ahead [h].
+    method : CrossEntropy, optional
+        How plans are sampled.
+    seed : int
+        Of the samples.
+
+    Returns
+    -------
+    MpcController
+        With the observer, the forecasts, the fall-backs and the costs of optimal control; the solver is another.
+    """
+    like = make_controller(
+        model, plant, settings=settings, observer=observer, horizon=sampled_horizon(plant.control_step, hours)
+    )
+    chosen, building = method or CrossEntropy(), ReducedBuilding(model, step_seconds=plant.control_step)
+    trials = HorizonRollouts(like.problem, building, plant.system, plant.scenario, like.points, chosen.samples)
+    return replace(like, solver=SamplingSolver(like.problem, trials, chosen, seed))
 
 
 def site_points(building: Building, devices: PlantDevices) -> SitePoints:

@@ -1,4 +1,4 @@
-"""Controllers by name: three rules, optimal control, the perfect bound, and those that others register."""
+"""Controllers by name: rules, optimal control with and without derivatives, the perfect bound, those of others."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -25,6 +25,7 @@ from mpc.studies.optimal_control import (
     default_horizon,
     held_space,
     make_controller,
+    make_sampling_controller,
     site_points,
 )
 from mpc.studies.study import HORIZON_HOURS, Study
@@ -127,8 +128,8 @@ def find_controller(name: str, subject: Subject = "any") -> RegisteredController
     Parameters
     ----------
     name : str
-        ``mpc``, ``schedule``, ``reset``, ``guideline36``, ``bound``, or one that was registered; of described plants
-        ``mpc``, ``full_speed`` or ``own``.
+        ``mpc``, ``schedule``, ``reset``, ``guideline36``, ``bound``, ``sampling``, or one that was registered; of
+        described plants ``mpc``, ``full_speed`` or ``own``.
     subject : str
         What it shall run on.
 
@@ -198,6 +199,17 @@ def _bound(study: Study, plant: SimulatedPlant) -> Controller:
         study.truth, plant, settings=study.controller_settings, observer=knowing_observer(study.truth, plant),
         horizon=default_horizon(study.settings.control_step, HORIZON_HOURS),
     )  # fmt: skip
+
+
+@register_controller(
+    "sampling", title="optimal control by sampling", predictive=True,
+    about="As optimal control, but plans are tried, many at once, on a simulated plant without smoothing, and the best "
+    "teach where to try next: no derivatives are needed.",
+)  # fmt: skip
+def _sampling(study: Study, plant: SimulatedPlant) -> Controller:
+    return make_sampling_controller(
+        study.model, plant, settings=study.controller_settings, hours=HORIZON_HOURS, seed=study.seed
+    )
 
 
 @register_controller(

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal.batch.trace import _copy, _where
+from thermal.batch.trace import copied, where
 from thermal.errors import MissingExtraError
 
 _EXPRESSIONS: dict[Any, str] = {
@@ -18,7 +18,7 @@ _EXPRESSIONS: dict[Any, str] = {
     np.equal: "one if {0} == {1} else zero", np.not_equal: "one if {0} != {1} else zero",
     np.bitwise_and: "{0} * {1}", np.logical_and: "{0} * {1}", np.invert: "one - {0}", np.logical_not: "one - {0}",
     np.bitwise_or: "{0} if {0} >= {1} else {1}", np.logical_or: "{0} if {0} >= {1} else {1}",
-    _copy: "{0}", _where: "{1} if {0} != zero else {2}",
+    copied: "{0}", where: "{1} if {0} != zero else {2}",
 }  # fmt: skip
 
 #: Instructions in a function, and in a loop: compilers take more than twice as long for twice as many.

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal.batch.compiled import compile_run, compiles
+from thermal.batch.machine import interprets, machine_runs, places_of
 from thermal.batch.trace import Instruction, Slot, Tape, Traced, View
 from thermal.errors import ModelError
 
@@ -31,7 +32,7 @@ class Program:
         ``numpy.float64``, or ``numpy.float32``, which is twice as fast.
     compiled : bool
         Whether numba compiles runs of plain arithmetic (extra ``[fast]``), which takes some seconds; otherwise each
-        instruction is a call of NumPy.
+        instruction is a call of NumPy, or, of one member in double precision, done by CasADi's virtual machine.
 
     Notes
     -----
@@ -41,18 +42,22 @@ class Program:
 
     def __init__(self, tape: Tape, members: int, dtype: Any = np.float64, compiled: bool = False) -> None:
         ModelError.unless(members >= 1, "batch", "1 member or more", repr(members))
-        self.members, self.dtype, self._compiled = members, np.dtype(dtype), compiled
+        self.members, self.dtype = members, np.dtype(dtype)
+        alone = members == 1 and self.dtype == np.float64 and not compiled
+        self._numbers, plain = compiled or alone, interprets if alone else compiles
         notes = _needed(tape)
-        notes = _grouped(notes) if compiled else notes
+        notes = _grouped(notes, plain) if self._numbers else notes
         self._work, self._end = self._memory(tape, notes), 0
-        self._arrays: dict[int, NDArray[Any]] = {k: self._array(tape.slots[k]) for k in sorted(tape.kept)}
+        self._kept = sorted(tape.kept)
+        self._arrays: dict[int, NDArray[Any]] = {k: self._array(tape.slots[k]) for k in self._kept}
         self._constants: dict[Any, NDArray[Any]] = {}
         run = self._laid_out(tape, notes)
         self._count, self._code = len(run), list[Callable[[], Any]]()
-        for plain, part in groupby(run, key=lambda step: compiled and compiles(step[0])):
-            steps = list(part)
-            if plain:
-                self._code += compile_run(self._work, steps)
+        parts = [(fits, list(part)) for fits, part in groupby(run, key=lambda step: self._numbers and plain(step[0]))]
+        unrolled = iter(self._unrolled(parts) if alone else ())
+        for fits, steps in parts:
+            if fits:
+                self._code += [next(unrolled)] if alone else compile_run(self._work, steps)
             else:
                 self._code += [partial(function, *inputs, out=output) for function, inputs, output in steps]
 
@@ -73,6 +78,17 @@ class Program:
         """Carry out everything once."""
         for instruction in self._code:
             instruction()
+
+    def _unrolled(self, parts: Sequence[tuple[bool, Sequence[Any]]]) -> list[Callable[[], Any]]:
+        """Hand runs of arithmetic to the virtual machine, with what others look at: what is kept, and other calls."""
+        masks = np.zeros((2, self._end), dtype=bool)
+        calls = [v for fits, steps in parts if not fits for _, inputs, _ in steps for v in inputs]
+        looked_at = [*(self._arrays[k] for k in self._kept), *(v for v in calls if isinstance(v, np.ndarray))]
+        for mask, arrays in zip(masks, (self._constants.values(), looked_at), strict=True):
+            for array in arrays:
+                mask[places_of(self._work, array)] = True
+        constant, wanted = masks
+        return machine_runs(self._work[: self._end], constant, wanted, [steps for fits, steps in parts if fits])
 
     def _laid_out(
         self, tape: Tape, notes: Sequence[Instruction]
@@ -117,7 +133,7 @@ class Program:
         return int(-(-int(np.prod(shape)) // line) * line)
 
     def _array(self, slot: Slot) -> NDArray[Any]:
-        if slot.truth and not self._compiled:
+        if slot.truth and not self._numbers:
             return np.zeros(self._shape(slot), dtype=bool)
         return self._take(self._shape(slot))
 
@@ -158,7 +174,7 @@ def _needed(tape: Tape) -> list[Instruction]:
     return found[::-1]
 
 
-def _grouped(notes: Sequence[Instruction]) -> list[Instruction]:
+def _grouped(notes: Sequence[Instruction], fits: Callable[[Any], bool]) -> list[Instruction]:
     """Order instructions so that plain arithmetic comes in few long runs; none passes what it depends on."""
     left, done, plain = list(notes), list[Instruction](), True
     while left:
@@ -167,7 +183,7 @@ def _grouped(notes: Sequence[Instruction]) -> list[Instruction]:
             takes = {v.slot.number for v in note.inputs if isinstance(v, View)}
             gives = note.output.slot.number
             free = not (takes & written) and gives not in written and gives not in read
-            if free and compiles(note.function) == plain:
+            if free and fits(note.function) == plain:
                 done.append(note)
             else:
                 waiting.append(note)

@@ -204,7 +204,7 @@ class Tape:
         value : Value
             What [as there].
         """
-        self.notes.append(Instruction(_copy, (self.operand(value),), target, True))
+        self.notes.append(Instruction(copied, (self.operand(value),), target, True))
 
 
 def _key(operand: Any) -> Any:
@@ -213,31 +213,65 @@ def _key(operand: Any) -> Any:
     return ("view", operand.slot.number, repr(operand.path)) if isinstance(operand, View) else ("number", operand)
 
 
-def _copy(value: Any, out: FloatArray) -> None:
+def copied(value: Any, out: FloatArray) -> None:
+    """Copy a value.
+
+    Parameters
+    ----------
+    value : ndarray or float
+        Any.
+    out : ndarray
+        Filled.
+    """
     np.copyto(out, value)
 
 
-def _where(mask: Any, first: Any, second: Any, out: FloatArray) -> None:
+def where(mask: Any, first: Any, second: Any, out: FloatArray) -> None:
+    """Take the first value where the mask is true, the second elsewhere.
+
+    Parameters
+    ----------
+    mask, first, second : ndarray or float
+        Truth values, and any [-].
+    out : ndarray
+        Filled.
+    """
     np.copyto(out, second)
     np.copyto(out, first, where=mask)
 
 
-class _Reduce(NamedTuple):
-    """A reduction over an axis, such as a sum."""
+class Reduce(NamedTuple):
+    """A reduction over an axis, such as a sum.
+
+    Parameters
+    ----------
+    function : numpy.ufunc
+        Of two values.
+    axis : int
+        Of one member's values.
+    """
 
     function: Any
     axis: int
 
     def __call__(self, values: FloatArray, out: FloatArray) -> None:
+        """Carry it out; see `Instruction`."""
         self.function.reduce(values, axis=self.axis, out=out)
 
 
-class _Take(NamedTuple):
-    """Rows by number."""
+class Take(NamedTuple):
+    """Rows by number.
+
+    Parameters
+    ----------
+    rows : tuple of int
+        Which.
+    """
 
     rows: tuple[int, ...]
 
     def __call__(self, values: FloatArray, out: FloatArray) -> None:
+        """Carry it out; see `Instruction`."""
         np.take(values, self.rows, axis=0, out=out, mode="clip")
 
 
@@ -285,7 +319,7 @@ class Traced(NDArrayOperatorsMixin):
             mask, first, second = args
             shape = np.broadcast_shapes(*(np.shape(v) if not isinstance(v, Traced) else v.shape for v in args))
             operands = [v if isinstance(v, Traced) else self.tape.operand(v) for v in (mask, first, second)]
-            return self.tape.note(_where, operands, shape)
+            return self.tape.note(where, operands, shape)
         if function in (np.stack, np.concatenate) and not options:
             parts = [self.tape_value(v) for v in args[0]]
             return _joined(self.tape, parts, function is np.stack)
@@ -296,7 +330,7 @@ class Traced(NDArrayOperatorsMixin):
 
     def number(self) -> Traced:
         """Give 1 for true and 0 for false; what is a number stays as it is."""
-        return self.tape.note(_copy, [self], self.shape) if self.view.slot.truth else self
+        return self.tape.note(copied, [self], self.shape) if self.view.slot.truth else self
 
     def tape_value(self, value: Value) -> Value:
         """Give a value as it is, or an array of a plain one.
@@ -314,7 +348,7 @@ class Traced(NDArrayOperatorsMixin):
             whole = range(rows[0], rows[0] + len(rows)) if rows else range(0)
             if rows and rows == list(whole):
                 return self[whole.start : whole.stop]
-            return self.tape.note(_Take(tuple(rows)), [self], (len(rows), *self.shape[1:]))
+            return self.tape.note(Take(tuple(rows)), [self], (len(rows), *self.shape[1:]))
         shape = np.empty(self.shape, dtype=np.int8)[index].shape
         return Traced(self.tape, View(self.view.slot, (*self.view.path, index)), shape)
 
@@ -364,7 +398,7 @@ class Traced(NDArrayOperatorsMixin):
     def _reduced(self, ufunc: Any, axis: int) -> Traced:
         axis = axis % len(self.shape)
         shape = (*self.shape[:axis], *self.shape[axis + 1 :])
-        return self.tape.note(_Reduce(ufunc, axis), [self], shape)
+        return self.tape.note(Reduce(ufunc, axis), [self], shape)
 
     def _product(self, first: Any, second: Any) -> Traced:
         """Product with a constant matrix or vector on either side."""

@@ -159,7 +159,8 @@ class Predictor:
         self._drive = {dt: p.end_gain[:, None] * modes.boundary for dt, p in parts.items()}
         self._response = {dt: np.ascontiguousarray(self._output @ push) for dt, push in self._push.items()}
         self._own = {dt: np.ascontiguousarray(np.diag(response)) for dt, response in self._response.items()}
-        self._fading = np.exp(-horizon.edges[:-1] / disturbance_time)
+        #: Share of the unmeasured heat that is left at the start of each step, shape (N,) [-].
+        self.fading = np.exp(-horizon.edges[:-1] / disturbance_time)
 
     def _design_inputs(self) -> FloatArray:
         """Give the inputs that hold where no channel decides: design values, or usual ones where there are none."""
@@ -200,7 +201,7 @@ class Predictor:
 
     def _undecided(self, data: HorizonData) -> FloatArray:
         """Give the drive of the modes by boundaries, gains and unmeasured heat, shape (N, r) [(W K)^0.5]."""
-        free = data.gains + self._fading[:, None] * data.disturbance
+        free = data.gains + self.fading[:, None] * data.disturbance
         outside = data.boundary.copy()
         outside[:, : outside.shape[1] - self.modes.n_signal] -= REFERENCE_TEMPERATURE
         steps = zip(self.horizon.steps, outside, free, strict=True)

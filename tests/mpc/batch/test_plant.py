@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mpc.batch.inputs import plant_rows
 from mpc.batch.plant import BatchedPlant
 from mpc.errors import PlantActionError, PlantError
 from mpc.kpi.kpis import measure_kpis
@@ -151,3 +152,24 @@ def test_what_does_not_fit_is_refused() -> None:
         batch.step(row)
     with pytest.raises(PlantError, match="one more step"):
         batch.step(row)
+
+
+def test_members_start_from_a_state_with_inputs_of_their_own() -> None:
+    plant = plant_of(days=1, noise=None)
+    rows = setpoints(plant, 60, 1)
+    plant.reset(0)
+    for row in rows[:24]:
+        plant.step(dict(zip([a.name for a in plant.actuators if a.required], row[:, 0].tolist(), strict=True)))
+    state, water = plant.model.modal_state, plant.loop.save().hvac.values[0]  # type: ignore[attr-defined]
+    inputs = {name: values[24:60] for name, values in plant_rows(plant).items()}
+    batch = BatchedPlant(plant, 2, dtype=np.float64)
+    batch.start(state, inputs, supply_water_temperature=water)
+    np.testing.assert_allclose(batch.zone_temperature[:, 0], plant.record().zone_temperature[-1], atol=EXACT)
+    for row in rows[24:]:
+        plant.step(dict(zip(batch.actions, row[:, 0].tolist(), strict=True)))
+        batch.step(np.repeat(row, 2, axis=1))
+    apart = batch.record(1).zone_temperature[:37] - plant.record().zone_temperature[24:]
+    assert np.abs(apart).max() < 0.1  # what local control had missed before is not part of the state
+    assert np.ptp(plant.record().zone_temperature[24:], axis=0).max() > 1.0
+    with pytest.raises(PlantError, match="order"):
+        batch.start(state[1:], inputs)

@@ -16,7 +16,9 @@ from mpc.environment.reward import EconomicReward, PaperStepReward
 from mpc.errors import MpcError, PlantActionError
 from mpc.kpi.record import PlantRecord
 from mpc.kpi.rewards import PaperReward, StageCost
+from mpc.loop.noise import SensorNoise
 from mpc.loop.simulated import SimulatedPlant
+from mpc.scenario.scenario import Scenario
 
 Make = Callable[..., ControlEnvironment]
 
@@ -100,6 +102,38 @@ def test_the_paper_reward_is_that_of_its_steps(make_environment: Make) -> None:
     ]
     np.testing.assert_allclose(rewards, np.reshape(each, (30, 3)).mean(axis=1), rtol=1e-13)
     assert -1.0 < min(rewards) < max(rewards) <= 0.0
+
+
+@pytest.mark.parametrize("each", [1, 3])
+def test_traced_steps_are_those_of_the_plants(make_environment: Make, each: int) -> None:
+    class Stepped(EconomicReward):
+        """The same reward said once more, so that it is taken of the plant itself."""
+
+        def of_steps(self, done: Any, scenario: Scenario, first_step: int) -> float:
+            return super().of_steps(done, scenario, first_step)
+
+    options = {"control_steps": each, "noise": SensorNoise()}
+    fast, slow = make_environment(options), make_environment(options, reward=Stepped())
+    assert fast._traced is not None and slow._traced is None
+    rng = np.random.default_rng(0)
+    for seed in (3, 4):
+        seen = [world.reset(seed=seed)[0] for world in (fast, slow)]
+        np.testing.assert_array_equal(*seen)
+        ended = False
+        while not ended:
+            action = rng.uniform(-1.0, 1.0, 2).astype(np.float32)
+            one, other = fast.step(action), slow.step(action)
+            np.testing.assert_allclose(one[0], other[0], rtol=0.0, atol=2e-6)
+            assert one[1] == pytest.approx(other[1], rel=1e-9, abs=1e-9)
+            ended = one[3]
+            assert ended == other[3]
+        for name in ("cost_tot", "tdis_tot", "ener_tot", "pele_tot", "zones"):
+            found, exact = one[4]["kpis"][name], other[4]["kpis"][name]
+            pairs = [(found[z], exact[z]) for z in exact] if name == "zones" else [(found, exact)]
+            assert all(a == pytest.approx(b, rel=1e-9, abs=1e-12) for a, b in pairs)
+        records = [world.plant.record().zone_temperature for world in (fast, slow)]  # the plant makes up for its steps
+        np.testing.assert_array_equal(*records)
+        np.testing.assert_allclose(fast._record().zone_temperature, records[1], rtol=0.0, atol=1e-9)
 
 
 def test_a_plant_of_others_is_rewarded_by_its_whole_record(make_plant: Callable[..., SimulatedPlant]) -> None:

@@ -9,11 +9,17 @@ import pytest
 
 from calibration.estimation.state_space import state_space
 from mpc.control.controller.site import Source
+from mpc.control.solvers.sampling import CrossEntropy
 from mpc.errors import ControlError
 from mpc.kpi.kpis import measure_kpis
 from mpc.loop.run import FixedSetpoints, run_closed_loop
 from mpc.model import control_model
-from mpc.studies.optimal_control import default_horizon, held_space, make_controller
+from mpc.studies.optimal_control import (
+    default_horizon,
+    held_space,
+    make_controller,
+    make_sampling_controller,
+)
 from mpc.studies.registry import find_controller, register_controller
 from thermal.effects.catalogue import chosen
 from thermal.model.modal import modal_model
@@ -106,3 +112,46 @@ def test_a_name_is_registered_once_and_is_a_name() -> None:
         with pytest.raises(ControlError, match="register_controller"):
             register_controller(wrong)  # type: ignore[arg-type]
     assert find_controller("mpc").title == "optimal control"
+
+
+def test_sampled_plans_cost_what_the_predictor_says_and_are_followed(model, make_plant) -> None:
+    plant = make_plant(noise=None)
+    few = CrossEntropy(samples=24, rounds=2)
+    kept = []
+    for _ in range(2):
+        controller = make_sampling_controller(model, plant, hours=6.0, method=few, seed=4)
+        seen, actions = plant.reset(1), []
+        for _ in range(3):
+            actions.append(controller.step(seen, plant.forecast()))
+            seen = plant.step(actions[-1])
+        kept.append([dict(a) for a in actions])
+        assert all(a.source is Source.OPTIMAL and a.solution.solver == "sampling" for a in actions)
+        assert all(a.solution.terms.total <= a.solution.start + 1e-9 for a in actions)
+        ranges = {a.name: a for a in plant.actuators}
+        assert all(ranges[name].accepts(value) for a in actions for name, value in a.items())
+    assert kept[0] == kept[1]
+    solution = actions[-1].solution
+    assert solution.plan.shape == (5, 2) and len(controller.problem.predictor.horizon) == 24
+
+
+def test_a_plan_tried_on_members_costs_what_the_smooth_model_says(model, make_plant) -> None:
+    plant, caught = make_plant(noise=None), []
+    controller = make_sampling_controller(model, plant, hours=6.0, method=CrossEntropy(samples=4, rounds=1))
+    solver, solve = controller.solver, controller.solver.solve
+
+    def watched(data, plan, time_limit=None):
+        caught.append(data)
+        return solve(data, plan, time_limit)
+
+    solver.solve = watched
+    seen = plant.reset(1)
+    for _ in range(28):  # until the plant runs, at seven
+        seen = plant.step(controller.step(seen, plant.forecast()))
+    problem, data = controller.problem, caught[-1]
+    shares = np.stack([np.tile(pair, problem.shape[0]) for pair in ([0.1, 0.4], [0.5, 0.9], [0.9, 0.5], [0.4, 0.1])])
+    tried = solver.trials(data, shares)
+    smooth = np.array([problem.terms(data, problem.predictor.rollout(data, problem.plan(row))) for row in shares])
+    energy = tried[:, :2].sum(axis=1), smooth[:, :2].sum(axis=1)
+    np.testing.assert_allclose(*energy, rtol=0.1)
+    np.testing.assert_allclose(tried[:, 4], smooth[:, 4], rtol=1e-9)
+    assert np.argsort(tried.sum(axis=1)).tolist() == np.argsort(smooth.sum(axis=1)).tolist()

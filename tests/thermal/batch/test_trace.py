@@ -43,6 +43,41 @@ def test_many_at_once_are_as_one_by_one(dtype: Any, each: bool) -> None:
         np.testing.assert_allclose(program.of(result).T, ones, rtol=1e-14 if dtype is np.float64 else 2e-6)
 
 
+@pytest.mark.parametrize("each", [True, False])
+def test_one_alone_is_as_one_of_many(each: bool) -> None:
+    """The virtual machine of one member does what NumPy does for several, between calls that are no arithmetic."""
+    found = []
+    for members in (1, 2):
+        tape = Tape()
+        x, y, memory = tape.value(3), tape.value(each=each), tape.value(3)
+        turned = tape.call(lambda values, out: np.copyto(out, values[::-1]), [memory * 2.0 + np.arctan(x)], 3)
+        divided = np.where(x > 0.5, 1.0 / (x - 0.5), np.rint(turned * 10.0))  # what is not taken may be infinite
+        result = tape.keep(equations(TracedOperations(tape), x, y) + divided, 3)
+        memory[...] = memory + result * 0.1
+        program, rng = Program(tape, members), np.random.default_rng(1)
+        program.of(memory)[...] = 0.25
+        rows = []
+        for _ in range(4):
+            program.of(x)[...] = rng.choice([0.0, 0.5, 0.75, 0.3], 3)[:, None]
+            program.of(y)[...] = rng.uniform()
+            with np.errstate(divide="ignore"):
+                program.run()
+            rows.append([program.of(result)[:, 0].copy(), program.of(memory)[:, -1].copy()])
+        found.append(np.array(rows))
+    assert np.isfinite(found[0]).all() and np.ptp(found[0]) > 1.0
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-13)
+
+
+def test_one_alone_rounds_halves_as_numpy_does() -> None:
+    tape, values = Tape(), np.array([0.5, 1.5, 2.5, -0.5, -1.5, 7.49999, 1e9 + 0.5, -3.2])
+    x = tape.value(8)
+    rounded = tape.keep(np.rint(x), 8)
+    program = Program(tape, 1)
+    program.of(x)[:, 0] = values
+    program.run()
+    np.testing.assert_array_equal(program.of(rounded)[:, 0], np.rint(values))
+
+
 def test_what_is_asked_twice_is_done_once() -> None:
     tape = Tape()
     x = tape.value(3)
