@@ -91,12 +91,13 @@ class Supervisor:
             )
 
     def end(self) -> None:
-        """End all parts, the guard last, so that it gives everything back with the controller's silence known."""
+        """End all parts at a time: the guard gives everything back at once, whatever the others still do."""
+        for process in self.processes.values():
+            process.terminate()
         for part in reversed(self.parts):
             process = self.processes.pop(part, None)
             if process is None:
                 continue
-            process.terminate()
             with contextlib.suppress(subprocess.TimeoutExpired):
                 process.wait(_PATIENCE)
             if process.poll() is None:

@@ -51,7 +51,7 @@ class Mailbox:
             JSON.
         """
         try:
-            message = json.loads(line)
+            message = json.loads(line, parse_int=_integer)
             canonical(message)  # refuses what is not finite, 1e999 too
             kind = message["kind"]
         except (ValueError, KeyError, TypeError, RecursionError):
@@ -76,6 +76,14 @@ class Mailbox:
         """Hand over what waits."""
         found, self._waiting = self._waiting, []
         return found
+
+
+def _integer(text: str) -> int:
+    """Read a whole number that a float has without a loss: arithmetic with others may not be possible."""
+    value = int(text)
+    if abs(value) > 2**53:
+        raise ValueError(f"expected a number up to 2^53, found one of {len(text)} digits")
+    return value
 
 
 async def serve_socket(path: Path, mailbox: Mailbox, status: Callable[[], Mapping[str, Any]]) -> asyncio.Server:

@@ -143,12 +143,10 @@ def _guard_status(site: Site) -> dict[str, Any]:
 
 
 def _send(site: Site, request: dict[str, Any], key: bytes) -> dict[str, Any]:
-    """Sign a request by the guard's clock, and hand it on."""
+    """Sign a request, and hand it on; its nonce is what the guard's answers name it by."""
     client = GuardClient(site.sockets)
+    signed = sign(request, key, site.clock().wall(), "page", float(site.limits()["tick"]))
     try:
-        told = client.ask({"kind": "status"})
-        if "wall" not in told:
-            return {"error": told.get("error") or "the guard does not answer"}
-        return client.ask(sign(request, key, float(told["wall"]), "page"))
+        return {"nonce": signed["nonce"]} | client.ask(signed)
     finally:
         client.close()

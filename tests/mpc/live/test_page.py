@@ -6,6 +6,7 @@ import asyncio
 import json
 import socket
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -76,7 +77,7 @@ def test_requests_of_operators_reach_the_guard_signed(site: Site, box: Mailbox) 
     for token, status in ((tokens["viewer"], 403), ("x", 401), (tokens["operator"], 202)):
         assert page.post("/mode", json=body, headers={"Authorization": f"Bearer {token}"}).status_code == status
     (message,) = box.empty()
-    assert message["invalid"] == "" and message["points"] == [SET] and message["expires"] == 1060.0
+    assert message["invalid"] == "" and message["points"] == [SET] and abs(message["expires"] - time.time() - 180.0) < 20.0  # two ticks of the guard are 120 s
     operator = {"Authorization": f"Bearer {tokens['operator']}"}
     for bad in ({"mode": 1, "points": []}, {"mode": "act"}, [], {"mode": "act", "points": [], "by": "root"}):
         assert page.post("/mode", json=bad, headers=operator).status_code == 422
@@ -110,7 +111,7 @@ def test_without_a_guard_nothing_is_claimed(site: Site) -> None:
 
 def test_the_socket_is_for_its_user_and_survives_rubbish(site: Site, box: Mailbox) -> None:
     assert not site.sockets.stat().st_mode & 0o077
-    for line in (b"\xff" * 100 + b"\n", b"{}\n", b"A" * 3_000_000):
+    for line in (b"\xff" * 100 + b"\n", b"{}\n", b'{"kind": "plan", "plan": {"made": 1' + b"0" * 400 + b"}}\n", b"A" * 3_000_000):
         with socket.socket(socket.AF_UNIX) as raw:
             raw.connect(str(site.sockets))
             try:
@@ -120,4 +121,4 @@ def test_the_socket_is_for_its_user_and_survives_rubbish(site: Site, box: Mailbo
     guard = GuardClient(site.sockets)
     assert guard.ask({"kind": "status"})["wall"] == 1000.0 and guard.ask({"kind": "beat"}) == {"error": ""}
     guard.close()
-    assert box.beat == 1.0 and box.empty() == []
+    assert box.beat == 1.0 and box.empty() == [] and box.dropped == 4
