@@ -42,9 +42,7 @@ def operator_key(folder: Path) -> bytes:
     return operator_key(folder)
 
 
-def sign(
-    request: Mapping[str, Any], key: bytes, wall: float, by: str, tick: float = 0.0
-) -> dict[str, Any]:
+def sign(request: Mapping[str, Any], key: bytes, wall: float, by: str, tick: float = 0.0) -> dict[str, Any]:
     """Complete a request of an operator.
 
     Parameters
