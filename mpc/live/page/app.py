@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import json
+import threading
+import time
 from collections.abc import AsyncIterator, Callable
 from importlib import resources
 from typing import Any
@@ -18,6 +20,9 @@ from thermal.plan.guard import extra
 
 #: Longest body of a request [bytes], time between two events of the stream [s], and most streams at a time.
 MOST_BYTES, EVERY, MOST_STREAMS = 100_000, 1.0, 20
+
+#: Age up to which a status is shown again [s]: half a stream's time.
+KEPT = 0.5
 
 
 def make_app(site: Site) -> Any:
@@ -35,12 +40,14 @@ def make_app(site: Site) -> Any:
     """
     fastapi, replies = extra("fastapi", "live", "the page"), extra("fastapi.responses", "live", "the page")
     access, key = Access(site.file.page.host, page_tokens(site.folder)), operator_key(site.folder)
+    style = resources.files("mpc.reports").joinpath("templates/style.css").read_text(encoding="utf-8")
     page = resources.files("mpc.live.page").joinpath("page.html").read_text(encoding="utf-8")
+    page = page.replace("/* style of all reports */", style)
     app = fastapi.FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
-    streams = [0]
+    streams, seen = [0], _Fresh(site)
 
     async def told() -> dict[str, Any]:
-        return await asyncio.to_thread(site_status, site)
+        return await asyncio.to_thread(seen.status)
 
     def checked(role: Role) -> Callable[..., None]:
         def check(request: Any) -> None:
@@ -65,7 +72,7 @@ def make_app(site: Site) -> Any:
         return replies.JSONResponse({"fine": fine, "guard": status["guard"]}, 200 if fine else 503)
 
     async def prometheus() -> Any:
-        text = await asyncio.to_thread(lambda: metrics(site.folder, _guard_status(site)))
+        text = await asyncio.to_thread(lambda: metrics(site.folder, seen.status()["status"]))
         return replies.PlainTextResponse(text.decode(), media_type="text/plain; version=0.0.4")
 
     async def status() -> Any:
@@ -77,9 +84,15 @@ def make_app(site: Site) -> Any:
 
         async def lines() -> AsyncIterator[str]:
             streams[0] += 1
+            number = None
             try:
                 while True:
-                    yield f"data: {json.dumps(await told())}\n\n"
+                    status = await told()
+                    shown = (status["controller"].get("picture") or {}).get("number")
+                    if shown == number:  # a plan is sent once
+                        status = status | {"controller": status["controller"] | {"picture": None}}
+                    yield f"data: {json.dumps(status)}\n\n"
+                    number = shown
                     await asyncio.sleep(EVERY)
             finally:
                 streams[0] -= 1
@@ -114,6 +127,21 @@ def make_app(site: Site) -> Any:
         work.__annotations__["request"] = fastapi.Request
         app.post(path, dependencies=operator)(work)
     return app
+
+
+class _Fresh:
+    """Status of a site, asked for once in a while: who floods the page does not reach the guard."""
+
+    def __init__(self, site: Site) -> None:
+        self._site, self._lock = site, threading.Lock()
+        self._until, self._status = 0.0, dict[str, Any]()
+
+    def status(self) -> dict[str, Any]:
+        with self._lock:
+            if time.monotonic() >= self._until:
+                self._status = site_status(self._site)
+                self._until = time.monotonic() + KEPT
+            return self._status
 
 
 def site_status(site: Site) -> dict[str, Any]:
