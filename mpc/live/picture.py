@@ -77,7 +77,7 @@ class DayCost:
         self._price: tuple[float, float] | None = None
 
     def add(self, inputs: Mapping[str, Any]) -> dict[str, Any] | None:
-        """Add the step that has ended before a plan; give ``since`` [s], ``cost`` [currency] and ``steps``, of which known.
+        """Add the step that has ended; give ``since`` [s], ``cost`` [currency], and ``steps``, those that are known.
 
         Parameters
         ----------

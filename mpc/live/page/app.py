@@ -83,6 +83,8 @@ def make_app(site: Site) -> Any:
             raise fastapi.HTTPException(429, "too many pages are open")
 
         async def lines() -> AsyncIterator[str]:
+            if streams[0] >= MOST_STREAMS:  # those that asked at the same time
+                return
             streams[0] += 1
             number = None
             try:
@@ -106,8 +108,8 @@ def make_app(site: Site) -> Any:
         except (ValueError, RecursionError):
             content = None
         if not isinstance(content, dict) or set(content) != set(wanted) or not all(
-            isinstance(content[k], t) for k, t in wanted.items()
-        ):
+            type(content[k]) is t for k, t in wanted.items()
+        ) or not all(isinstance(point, str) for point in content["points"]):
             raise fastapi.HTTPException(422, f"expected JSON with {', '.join(wanted)}")
         answer = await asyncio.to_thread(_send, site, {"kind": kind, **content}, key)
         return replies.JSONResponse(answer, 503 if answer["error"] else 202)
