@@ -94,10 +94,8 @@ class Supervisor:
         """End all parts at a time: the guard gives everything back at once, whatever the others still do."""
         for process in self.processes.values():
             process.terminate()
-        for part in reversed(self.parts):
-            process = self.processes.pop(part, None)
-            if process is None:
-                continue
+        while self.processes:
+            _, process = self.processes.popitem()
             with contextlib.suppress(subprocess.TimeoutExpired):
                 process.wait(_PATIENCE)
             if process.poll() is None:
