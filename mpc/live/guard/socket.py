@@ -110,6 +110,8 @@ async def serve_socket(path: Path, mailbox: Mailbox, status: Callable[[], Mappin
                 await writer.drain()
         except (ValueError, ConnectionError):  # a line that is too long, a peer that has gone
             mailbox.dropped += 1
+        except asyncio.CancelledError:  # the guard ends while somebody is connected
+            return
         finally:
             writer.close()
 
