@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
+import time
 from pathlib import Path
 
 
@@ -55,8 +56,12 @@ class PostgresServer:
         self.address = f"postgresql://tester:secret@/postgres?host={folder}"
 
     def start(self) -> None:
-        """Begin, or go on after `stop`."""
-        subprocess.run([*self._control, "start"], check=True, capture_output=True, cwd=self.folder)
+        """Begin, or go on after `stop`: on a busy machine the last of its processes take a moment to leave."""
+        for left in reversed(range(5)):
+            done = subprocess.run([*self._control, "start"], check=not left, capture_output=True, cwd=self.folder)
+            if not done.returncode:
+                return
+            time.sleep(1.0)
 
     def stop(self) -> None:
         """Stop at once, as a crash does; what was committed stays."""

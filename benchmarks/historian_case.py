@@ -22,6 +22,7 @@ from pathlib import Path
 import pandas as pd
 from _table import markdown, write
 
+from mpc.live.historian.store import Historian
 from thermal import Building, Case, save_case
 from thermal.intake.historian import historian_telemetry, pack_days
 from thermal.pilot.building import pilot_building
@@ -32,15 +33,6 @@ _OF_DEVICE = ("zone_air_temperature_sensor", "supply_air_flowrate_sensor", "disc
               "supply_air_damper_percentage_command", "heating_water_valve_percentage_command",
               "zone_air_heating_temperature_setpoint", "zone_air_cooling_temperature_setpoint",
               "heating_power_sensor")  # fmt: skip
-
-_TABLES = """
-CREATE SCHEMA buildingmpc;
-SET search_path = buildingmpc;
-CREATE TABLE point (id integer GENERATED ALWAYS AS IDENTITY PRIMARY KEY, name text NOT NULL UNIQUE, unit text);
-CREATE TABLE sample (point integer NOT NULL REFERENCES point (id), time timestamptz NOT NULL,
-                     value double precision NOT NULL, PRIMARY KEY (point, time));
-"""
-
 
 @contextmanager
 def postgres(folder: Path) -> Iterator[str]:
@@ -64,8 +56,10 @@ def fill(address: str, building: Building, days: int) -> None:
     import psycopg
 
     names = [f"{d.name}/{p}" for d in building.devices if d.zone for p in _OF_DEVICE][:POINTS]
+    with Historian(address) as historian:
+        historian.migrate()
     with psycopg.connect(address, autocommit=True) as connection:
-        connection.execute(_TABLES)
+        connection.execute("SET search_path = buildingmpc")
         connection.execute("INSERT INTO point (name) SELECT unnest(%s::text[])", [names])
         connection.execute(
             "INSERT INTO sample SELECT id, t, 0.5 + 0.4 * sin(extract(epoch FROM t) / 9000 + id) FROM "

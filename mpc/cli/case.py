@@ -63,6 +63,7 @@ def case_pack(
     """
     from pandas import Timedelta, Timestamp
 
+    from mpc.live.historian.store import Historian
     from thermal.errors import PlanError
     from thermal.intake.historian import pack_days
 
@@ -70,5 +71,7 @@ def case_pack(
         last = Timestamp(before) if before else Timestamp.now("UTC") - Timedelta(days=7)
     except ValueError as error:
         raise PlanError("--before", "a time in ISO 8601", repr(before)) from error
+    with Historian(address, schema) as historian:
+        historian.migrate()
     days = pack_days(address, last.tz_localize("UTC") if last.tzinfo is None else last, schema)
     return answer(json, {"days": days}, lambda: say(f"{days} days packed."))

@@ -70,8 +70,7 @@ def identify(
             seen, machines = made.telemetry, made.machines
         else:
             seen = read_telemetry(telemetry, study.site)
-            with study.plant() as there:
-                machines = study.machines(there)
+            machines = study.seen_machines(seen)
         found = identify_plant(seen, machines, progress)
         command = " ".join(["buildingmpc", *sys.argv[1:]])
         report = write_identified(found, made, out, command=command, force=force)

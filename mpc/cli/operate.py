@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import getpass
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,9 +14,13 @@ from mpc.cli.options import Json, file, ids, value
 from mpc.errors import LiveError
 
 if TYPE_CHECKING:
+    from mpc.live.guard.socket import GuardClient
     from mpc.live.site import Site
 
 _PARTS = ("guard", "collector", "controller", "page")
+
+#: How long the guard may read and write after its wait, before an operator is told that it does not answer [s].
+_PATIENCE = 10.0
 
 
 def operate(
@@ -53,7 +58,7 @@ def operate(
 
     if not json:
         say(f"Operating {read.file.name}; page: http://{read.file.page.host}:{read.file.page.port}   Ctrl-C ends it")
-        say(f"Logs: {read.folder}")
+        say(f"Logs: {read.folder}; addresses of the page for viewers and operators: {read.folder / 'page.json'}")
     return Supervisor(site, read.folder).run()
 
 
@@ -107,13 +112,16 @@ def _guard(site: Site) -> dict[str, Any]:
 def _status(site: Site, json: bool) -> int:
     told = _guard(site)
     decision = told["decision"]
+    planned = (told["plan"] or {"values": {}})["values"]
     rows = [
-        (name, decision["modes"][name], decision["held"].get(name), decision["why"].get(name, ""))
+        (name, decision["modes"][name], told["readings"].get(name, {}).get("value"), planned.get(name),
+         decision["held"].get(name), decision["why"].get(name, ""))
         for name in decision["modes"]
-    ]
+    ]  # fmt: skip
 
     def show() -> None:
-        show_table(site.file.name, {"point": "", "mode": "", "in force": "g", "why not": ""}, rows)
+        numbers = dict.fromkeys(("shows", "planned", "in force"), "g")
+        show_table(site.file.name, {"point": "", "mode": "", **numbers, "why not": ""}, rows)
         for doubt in decision["doubts"]:
             say(f"Doubt: {doubt}.")
 
@@ -135,15 +143,33 @@ def _ask(site: Site, approve: str, mode: str, json: bool) -> int:
         request = {"kind": "approve", "points": points, "plan": plan["number"]}
     else:
         name, _, listed = mode.partition(":")
+        LiveError.unless_known(name, ("shadow", "advise", "act"), "--mode", "a mode")
         request = {"kind": "mode", "mode": name, "points": list(ids(listed)) or list(told["decision"]["modes"])}
+    for point in request["points"]:
+        LiveError.unless_known(point, told["decision"]["modes"], "points", "one that may be written to")
+    tick = float(site.limits()["tick"])
+    signed = sign(request, operator_key(site.folder), site.clock().wall(), getpass.getuser(), tick)
     client = GuardClient(site.sockets)
-    signed = sign(request, operator_key(site.folder), float(told["wall"]), getpass.getuser())
-    error = client.ask(signed)["error"]
-    client.close()
+    try:
+        error = client.ask(signed)["error"] or _answered(client, signed["nonce"], site.clock().real(2.0 * tick))
+    finally:
+        client.close()
     if error:
-        complain(f"error: {error}")
+        complain(f"error: refused by the guard: {error}")
         return 1
-    return answer(json, request, lambda: say("The guard has the request; --status says what it made of it."))
+    done = f"{request['kind']}: {', '.join(request['points']) or 'no point'}"
+    return answer(json, request, lambda: say(f"The guard took it: {done}"))
+
+
+def _answered(client: GuardClient, nonce: str, wait: float) -> str:
+    """Wait for what the guard makes of a request at its next look; empty where it took it."""
+    end = time.monotonic() + wait + _PATIENCE
+    while time.monotonic() < end:
+        known = client.ask({"kind": "status"}).get("answers", {})
+        if nonce in known:
+            return str(known[nonce])
+        time.sleep(0.1)
+    return "no answer in time; --status says what is in force"
 
 
 def replay(

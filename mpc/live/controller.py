@@ -17,9 +17,10 @@ from mpc.live.clock import Clock
 from mpc.live.guard.socket import GuardClient
 from mpc.live.historian.store import Historian
 from mpc.live.outlook import Outlook
+from mpc.live.picture import DayCost, picture
 from mpc.live.planner import Planner, forecast_to_dict, needed_columns, no_plan
 from mpc.live.site import Site
-from mpc.live.state import write_state
+from mpc.live.state import read_state, write_state
 from mpc.loop.plant import Controller
 from thermal.case.points import POINT_TYPES, ZONE_TEMPERATURE
 
@@ -57,6 +58,7 @@ class ControlProcess:
             "start", {"code": code_version(), "configuration": site.hash, "site": site.path.name,
                       "controller": site.file.controller, "wall": self.clock.wall()},
         )  # fmt: skip
+        self._day = DayCost(site, read_state(site.folder / "controller.json").get("day"))
         self._stop = threading.Event()
 
     def run(self) -> int:
@@ -70,9 +72,9 @@ class ControlProcess:
             while not self._stop.is_set():
                 now = self.clock.wall()
                 begin = step * (now // step)
-                plan = self.plan(begin)
+                plan, shown = self.plan(begin)
                 answer = client.ask({"kind": "plan", "plan": plan})
-                write_state(self.site.folder / "controller.json", plan | {"answer": answer, "wall": now})
+                write_state(self.site.folder / "controller.json", plan | shown | {"answer": answer, "wall": now})
                 self._watch(begin + step, plan, client)
             return 0
         finally:
@@ -119,8 +121,8 @@ class ControlProcess:
     def _end(self, number: int, frame: FrameType | None) -> None:
         self._stop.set()
 
-    def plan(self, begin: float) -> dict[str, Any]:
-        """Make the plan of a step, and write down of what.
+    def plan(self, begin: float) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Make the plan of a step, and write down of what; and what the page shows of it.
 
         Parameters
         ----------
@@ -132,7 +134,7 @@ class ControlProcess:
         made = self.clock.wall()
         plan = {"number": int(10.0 * made), "made": made, "configuration": self.site.hash, "inputs": latest} | planned
         self.log.append("plan", {"inputs": inputs, "plan": plan})
-        return plan
+        return plan, {"picture": picture(self.site, plan, inputs), "day": self._day.add(inputs)}
 
     def _inputs(self, begin: float) -> tuple[dict[str, Any], dict[str, Any]]:
         """Collect what a plan is made of, and the last value of each measurement with its time."""

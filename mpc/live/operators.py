@@ -13,7 +13,7 @@ from typing import Any
 from mpc.errors import LiveError
 from mpc.live.audit import canonical
 
-#: How long a request may be under way [s].
+#: How long a request may be under way, besides the guard's own wait between two looks [s].
 VALID = 60.0
 
 _SHAPES: Mapping[str, Mapping[str, Any]] = {
@@ -42,7 +42,7 @@ def operator_key(folder: Path) -> bytes:
     return operator_key(folder)
 
 
-def sign(request: Mapping[str, Any], key: bytes, wall: float, by: str) -> dict[str, Any]:
+def sign(request: Mapping[str, Any], key: bytes, wall: float, by: str, tick: float = 0.0) -> dict[str, Any]:
     """Complete a request of an operator.
 
     Parameters
@@ -55,8 +55,10 @@ def sign(request: Mapping[str, Any], key: bytes, wall: float, by: str) -> dict[s
         Wall clock [s].
     by : str
         Who asks, for the log.
+    tick : float
+        Time between two looks of the guard [s]: a request waits for the next one.
     """
-    made = {**request, "by": by, "nonce": secrets.token_hex(16), "expires": wall + VALID}
+    made = {**request, "by": by, "nonce": secrets.token_hex(16), "expires": wall + VALID + 2.0 * tick}
     return made | {"signature": _signature(made, key)}
 
 

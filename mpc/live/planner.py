@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from mpc.adapters.described.actuators import described_actuators
 from mpc.baselines.plants import FullSpeed
 from mpc.control.identified.controller import IdentifiedController, PlannedAction
 from mpc.errors import LiveError, MpcError
@@ -16,10 +17,9 @@ from mpc.identify.machines import find_machines
 from mpc.identify.model import read_model
 from mpc.live.site import Site
 from mpc.loop.actuators import Actuator
-from mpc.loop.conversion import SIGNAL_UNITS
 from mpc.loop.plant import Controller, Measurements, PointLayout
 from mpc.scenario.forecast import Forecast
-from thermal.case.points import OUTDOOR_TEMPERATURE, POINT_TYPES
+from thermal.case.points import OUTDOOR_TEMPERATURE
 
 
 def site_actuators(site: Site) -> tuple[Actuator, ...]:
@@ -30,16 +30,8 @@ def site_actuators(site: Site) -> tuple[Actuator, ...]:
     site : Site
         As read.
     """
-    found = []
-    for name, entry in site.plant.actuators.items():
-        point = site.file.points.get(name)
-        ends = (point.range if point is not None else None) or entry.range
-        if ends is None:
-            raise LiveError(f"actuator {name}", "a range, here or in the plant's description", "none")
-        kind = POINT_TYPES.get(name.rpartition("/")[2])
-        unit = "1" if kind is None else SIGNAL_UNITS[kind.quantity]
-        found.append(Actuator(name, unit, *ends, False, entry.kind or "continuous", entry.minimum))
-    return tuple(found)
+    ranges = {name: entry.range for name, entry in site.file.points.items() if entry.range is not None}
+    return described_actuators(site.plant, ranges)
 
 
 def site_controller(site: Site) -> Controller:

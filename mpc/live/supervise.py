@@ -91,12 +91,11 @@ class Supervisor:
             )
 
     def end(self) -> None:
-        """End all parts, the guard last, so that it gives everything back with the controller's silence known."""
-        for part in reversed(self.parts):
-            process = self.processes.pop(part, None)
-            if process is None:
-                continue
+        """End all parts at a time: the guard gives everything back at once, whatever the others still do."""
+        for process in self.processes.values():
             process.terminate()
+        while self.processes:
+            _, process = self.processes.popitem()
             with contextlib.suppress(subprocess.TimeoutExpired):
                 process.wait(_PATIENCE)
             if process.poll() is None:

@@ -11,7 +11,9 @@ from typing import Any
 import pandas as pd
 
 from mpc.adapters.boptest.scenario import PERIOD_DAYS
+from mpc.adapters.described.actuators import described_actuators
 from mpc.adapters.described.load import load_plant, period_of
+from mpc.adapters.described.programs import SiteProgram
 from mpc.adapters.described.read import read_description
 from mpc.adapters.described.schema import PlantFile
 from mpc.adapters.described.seen import seen_scenario
@@ -21,7 +23,7 @@ from mpc.errors import ControlError, PlantError
 from mpc.identify.excitation import Excitation, ExcitationSettings
 from mpc.identify.machines import Machine, find_machines
 from mpc.identify.model import PlantModel
-from mpc.identify.telemetry import PlantTelemetry, Site, run_recorded
+from mpc.identify.telemetry import SET, PlantTelemetry, Site, run_recorded
 from mpc.loop.run import ClosedLoopRun
 from mpc.scenario.scenario import Scenario
 
@@ -142,6 +144,20 @@ class PlantStudy:
         if self.model is not None:
             return tuple(found.machine for found in self.model.maps)
         return find_machines(plant.actuators, plant.columns, plant.zone_names, self.actuators)
+
+    def seen_machines(self, seen: PlantTelemetry) -> tuple[Machine, ...]:
+        """Actuators that are controlled, where there is telemetry: a real building has no program to ask.
+
+        Parameters
+        ----------
+        seen : PlantTelemetry
+            Of the plant.
+        """
+        if not isinstance(self.description.plant, SiteProgram):
+            with self.plant() as there:
+                return self.machines(there)
+        columns = [str(name) for name in seen.frame if not str(name).startswith(SET)]
+        return find_machines(described_actuators(self.description), columns, tuple(self.site.areas), self.actuators)
 
     def optimal(self, plant: Any) -> IdentifiedController:
         """Make optimal control.

@@ -56,19 +56,18 @@ def test_real_drills(drills: ModuleType, script: Callable[[str], ModuleType]) ->
         pytest.skip("needs a PostgreSQL server (Debian: apt install postgresql)")
     top = Path(tempfile.mkdtemp(prefix="drills"))  # the database's user must get there, and not into pytest's folders
     top.chmod(0o755)
-    chosen = "controller killed,network cut,overrides the first,database down,clock jumps ahead,plan out of range"
+    chosen = "controller killed,network cut,overrides the first"  # a part, the wire, an operator
     lines: list[str] = []
     try:
-        found = drills.run_drills(6, 7, top / "site", chosen, lines.append)
+        found = drills.run_drills(3, 7, top / "site", chosen, lines.append)
     finally:
         shutil.rmtree(top, ignore_errors=True)
-    assert len(found["drills"]) == 6 and {one["fault"] for one in found["drills"]} == {
-        "controller killed", "network cut", "operator overrides the first", "database down", "clock jumps ahead",
-        "plan out of range",
+    assert {one["fault"] for one in found["drills"]} == {
+        "controller killed", "network cut", "operator overrides the first",
     }  # fmt: skip
     for one in found["drills"]:
         assert not one["bad_writes"] and not one["overridden"] and not one["not_back"], one
         assert not one["late"], one  # a control step is 1.5 s: a machine that stands still for a second fails here
-    assert found["lost"] == 0 and found["samples"] > 100 and found["writes"] > 10
-    assert found["not_replayed"] == [] and found["decisions"] > 50
-    assert "| all | 6 | 0 | 0 | 0 | 0 | 0 |" in drills.report(found)
+    assert found["lost"] == 0 and found["samples"] > 50 and found["writes"] > 5
+    assert found["not_replayed"] == [] and found["decisions"] > 25
+    assert "| all | 3 | 0 | 0 | 0 | 0 | 0 |" in drills.report(found)

@@ -97,13 +97,19 @@ def test_a_guard_of_the_command_gives_back_and_listens(tmp_path: Path) -> None:
         env=os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])},
     )  # fmt: skip
     try:
+        while not (tmp_path / "live" / "guard.sock").exists() and time.monotonic() < end:
+            time.sleep(0.02)
         while device.held(13) and time.monotonic() < end:
             time.sleep(0.02)
         assert device.held(13) == {}
         told = json.loads(run("operate", path, "--status", "--json")[1])
         assert told["decision"]["modes"] == {SET: "advise"} and "not been heard of" in told["decision"]["doubts"][0]
         assert run("operate", path, "--approve", "all")[0] == 2  # there is no plan
-        assert run("operate", path, "--mode", f"shadow:{SET}")[0] == 0
+        for wrong, says in (("actt", "the nearest valid one is 'act'"), ("act:x/y", "one that may be written to")):
+            code, text = run("operate", path, "--mode", wrong)
+            assert code == 2 and says in text
+        code, text = run("operate", path, "--mode", f"shadow:{SET}")
+        assert code == 0 and "The guard took it" in text
         while time.monotonic() < end and told["decision"]["modes"] != {SET: "shadow"}:
             told = json.loads(run("operate", path, "--status", "--json")[1])
             time.sleep(0.02)

@@ -170,7 +170,7 @@ def pack_days(address: str, before: pd.Timestamp, schema: str = SCHEMA) -> int:
         Days that end by then are packed: late samples should have come in. A day whose samples have become more is
         packed anew.
     schema : str
-        As for `read_historian`.
+        As for `read_historian`; live operation makes its table ``packed_day``, and deletes from it.
 
     Returns
     -------
@@ -183,11 +183,6 @@ def pack_days(address: str, before: pd.Timestamp, schema: str = SCHEMA) -> int:
         The database cannot be read or written.
     """
     with _connected(address, schema, read_only=False) as cursor:
-        cursor.execute(
-            "CREATE TABLE IF NOT EXISTS packed_day (day date, point integer REFERENCES point (id), count integer "
-            "NOT NULL, samples bytea NOT NULL, PRIMARY KEY (day, point))"
-        )
-        cursor.execute("ALTER TABLE packed_day ALTER samples SET STORAGE EXTERNAL")  # packing again gains nothing
         first, last = cursor.execute("SELECT min(time), max(time) FROM sample WHERE time < %s", [before]).fetchone()
         if first is None:
             return 0

@@ -17,8 +17,8 @@ A tick is what the guard saw at one time, in plain types:
     Whether the guard is being ended.
 
 A decision has ``writes`` (values by point), ``releases`` (points), ``doubts`` (why everything is given back),
-``refused`` (what was asked for in vain), ``why`` (by point that is not written to, the reason), ``held`` (what is in
-force) and ``modes``.
+``refused`` (what was asked for in vain), ``answers`` (by the nonce of a request, what is wrong with it; empty is well),
+``why`` (by point that is not written to, the reason), ``held`` (what is in force) and ``modes``.
 """
 
 from __future__ import annotations
@@ -32,6 +32,9 @@ from mpc.live.guard.rules import GuardRules, PointRule
 
 #: Largest relative difference between what was written and what a device says of it: single precision, twice converted.
 SAME = 1e-5
+
+#: Letters of a nonce: those of `mpc.live.operators.sign`; a stranger's may be as long as a message.
+_NONCE = 32
 
 Tick = Mapping[str, Any]
 
@@ -139,9 +142,9 @@ class Guard:
         dict
             Plain types, as above.
         """
-        state, why, refused = self.state, dict[str, str](), list[str]()
+        state, why, refused, answers = self.state, dict[str, str](), list[str](), dict[str, str]()
         doubts = [*self._clocks(tick), *self._results(tick), *self._readings(tick, why)]
-        doubts += self._messages(tick, refused)
+        doubts += self._messages(tick, refused, answers)
         doubts += self._freshness(tick)
         if tick["stopping"]:
             doubts.append("the guard is being ended")
@@ -154,7 +157,8 @@ class Guard:
         state.orders = {**writes, **dict.fromkeys(releases)}
         state.mono, state.wall = tick["mono"], tick["wall"]
         return {
-            "writes": writes, "releases": releases, "doubts": doubts, "refused": refused, "why": why,
+            "writes": writes, "releases": releases, "doubts": doubts, "refused": refused,
+            "answers": answers, "why": why,
             "held": dict(state.held), "giving_back": sorted(state.giving_back), "modes": dict(state.modes),
         }  # fmt: skip
 
@@ -237,7 +241,7 @@ class Guard:
             del state.held[name]
             state.overridden[name] = now
 
-    def _messages(self, tick: Tick, refused: list[str]) -> list[str]:
+    def _messages(self, tick: Tick, refused: list[str], answers: dict[str, str]) -> list[str]:
         """Take plans and requests; a plan that no sound controller makes is a doubt."""
         state, doubts = self.state, list[str]()
         for message in tick["messages"]:
@@ -252,6 +256,7 @@ class Guard:
                 state.plan_since = tick["mono"] - max(tick["wall"] - plan["made"], 0.0)
             elif message["kind"] == "mode":
                 problem = check_mode(message, self.rules, state.nonces, tick["wall"])
+                answers.setdefault(message["nonce"][:_NONCE], problem)
                 if problem:
                     refused.append(f"mode: {problem}")
                     continue
@@ -261,6 +266,7 @@ class Guard:
                     state.approved.pop(name, None)
             else:
                 problem = check_approval(message, state.plan, state.modes, state.nonces, tick["wall"])
+                answers.setdefault(message["nonce"][:_NONCE], problem)
                 if problem:
                     refused.append(f"approval: {problem}")
                     continue

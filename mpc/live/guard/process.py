@@ -26,6 +26,9 @@ from mpc.live.site import Site
 #: Ticks that the end of the guard takes at most, so that releases are seen to have been done.
 _LAST_TICKS = 5
 
+#: Answers to requests of operators that the status keeps: more than are asked for while somebody waits.
+_ANSWERS = 50
+
 
 class GuardProcess:
     """Runs a site's guard.
@@ -65,6 +68,7 @@ class GuardProcess:
         self._stop = asyncio.Event()
         self._notifier = Notifier(site.file.notify, site.file.name)
         self._status: dict[str, Any] = {}
+        self._answers: dict[str, str] = {}
 
     async def run(self) -> int:
         """Guard until it is ended; return the exit code."""
@@ -124,10 +128,12 @@ class GuardProcess:
         digest = self.log.append("tick", {"tick": tick, "decision": decision})
         self._results = await self._order(decision["writes"], decision["releases"])
         plan = self.guard.state.plan
+        known = decision["answers"] | self._answers  # a request that is repeated does not change its first answer
+        self._answers = dict(list((self._answers | known).items())[-_ANSWERS:])
         self._status = {
             "site": self.site.file.name, "wall": tick["wall"], "configuration": self.rules.configuration,
             "decision": decision, "readings": readings, "plan": plan, "log": digest, "code": code_version(),
-            "dropped": self.mailbox.dropped, "orders": self._results,
+            "dropped": self.mailbox.dropped, "answers": self._answers, "orders": self._results,
             "overridden": sorted(self.guard.state.overridden), "taken": dict(self.guard.state.taken),
         }  # fmt: skip
         self._notifier.tell(decision["doubts"], tick["wall"])

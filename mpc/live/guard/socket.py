@@ -51,7 +51,7 @@ class Mailbox:
             JSON.
         """
         try:
-            message = json.loads(line)
+            message = json.loads(line, parse_int=_integer)
             canonical(message)  # refuses what is not finite, 1e999 too
             kind = message["kind"]
         except (ValueError, KeyError, TypeError, RecursionError):
@@ -78,6 +78,14 @@ class Mailbox:
         return found
 
 
+def _integer(text: str) -> int:
+    """Read a whole number that a float has without a loss: arithmetic with others may not be possible."""
+    value = int(text)
+    if abs(value) > 2**53:
+        raise ValueError(f"expected a number up to 2^53, found one of {len(text)} digits")
+    return value
+
+
 async def serve_socket(path: Path, mailbox: Mailbox, status: Callable[[], Mapping[str, Any]]) -> asyncio.Server:
     """Listen, for this user alone.
 
@@ -102,6 +110,8 @@ async def serve_socket(path: Path, mailbox: Mailbox, status: Callable[[], Mappin
                 await writer.drain()
         except (ValueError, ConnectionError):  # a line that is too long, a peer that has gone
             mailbox.dropped += 1
+        except asyncio.CancelledError:  # the guard ends while somebody is connected
+            return
         finally:
             writer.close()
 

@@ -222,7 +222,7 @@ class Historian:
         return pd.DataFrame(self._run("read", work), columns=["name", "unit", "samples", "first", "last"])
 
     def trim(self, before: pd.Timestamp) -> int:
-        """Delete the samples before a time; return how many.
+        """Delete the samples before a time, packed ones too; return how many of those that are not packed.
 
         Parameters
         ----------
@@ -231,7 +231,9 @@ class Historian:
         """
 
         def work(cursor: psycopg.Cursor[Any]) -> int:
-            cursor.execute("DELETE FROM sample WHERE time < %s", [before.floor("us").to_pydatetime()])
+            first = before.floor("us").tz_convert("UTC")
+            cursor.execute("DELETE FROM packed_day WHERE day <= %s", [first.date()])  # of its own day samples are left
+            cursor.execute("DELETE FROM sample WHERE time < %s", [first.to_pydatetime()])
             return int(cursor.rowcount)
 
         return int(self._run("trim", work))

@@ -77,5 +77,5 @@ class Access:
         kind, _, token = authorization.partition(" ")
         roles = {r for r, t in self._tokens.items() if hmac.compare_digest(t.encode(), token.encode())}
         if kind != "Bearer" or not roles:
-            return 401, f"a token of a {role} is needed"
-        return (0, "") if role in roles or "operator" in roles else (403, f"a token of an {role} is needed")
+            return 401, f"a token is needed: {role}"
+        return (0, "") if role in roles or "operator" in roles else (403, f"a token is needed: {role}")

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import json
+import threading
+import time
 from collections.abc import AsyncIterator, Callable
 from importlib import resources
 from typing import Any
@@ -18,6 +20,9 @@ from thermal.plan.guard import extra
 
 #: Longest body of a request [bytes], time between two events of the stream [s], and most streams at a time.
 MOST_BYTES, EVERY, MOST_STREAMS = 100_000, 1.0, 20
+
+#: Age up to which a status is shown again [s]: half a stream's time.
+KEPT = 0.5
 
 
 def make_app(site: Site) -> Any:
@@ -35,12 +40,14 @@ def make_app(site: Site) -> Any:
     """
     fastapi, replies = extra("fastapi", "live", "the page"), extra("fastapi.responses", "live", "the page")
     access, key = Access(site.file.page.host, page_tokens(site.folder)), operator_key(site.folder)
+    style = resources.files("mpc.reports").joinpath("templates/style.css").read_text(encoding="utf-8")
     page = resources.files("mpc.live.page").joinpath("page.html").read_text(encoding="utf-8")
+    page = page.replace("/* style of all reports */", style)
     app = fastapi.FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
-    streams = [0]
+    streams, seen = [0], _Fresh(site)
 
     async def told() -> dict[str, Any]:
-        return await asyncio.to_thread(site_status, site)
+        return await asyncio.to_thread(seen.status)
 
     def checked(role: Role) -> Callable[..., None]:
         def check(request: Any) -> None:
@@ -65,7 +72,7 @@ def make_app(site: Site) -> Any:
         return replies.JSONResponse({"fine": fine, "guard": status["guard"]}, 200 if fine else 503)
 
     async def prometheus() -> Any:
-        text = await asyncio.to_thread(lambda: metrics(site.folder, _guard_status(site)))
+        text = await asyncio.to_thread(lambda: metrics(site.folder, seen.status()["status"]))
         return replies.PlainTextResponse(text.decode(), media_type="text/plain; version=0.0.4")
 
     async def status() -> Any:
@@ -76,10 +83,18 @@ def make_app(site: Site) -> Any:
             raise fastapi.HTTPException(429, "too many pages are open")
 
         async def lines() -> AsyncIterator[str]:
+            if streams[0] >= MOST_STREAMS:  # those that asked at the same time
+                return
             streams[0] += 1
+            number = None
             try:
                 while True:
-                    yield f"data: {json.dumps(await told())}\n\n"
+                    status = await told()
+                    shown = (status["controller"].get("picture") or {}).get("number")
+                    if shown == number:  # a plan is sent once
+                        status = status | {"controller": status["controller"] | {"picture": None}}
+                    yield f"data: {json.dumps(status)}\n\n"
+                    number = shown
                     await asyncio.sleep(EVERY)
             finally:
                 streams[0] -= 1
@@ -93,8 +108,8 @@ def make_app(site: Site) -> Any:
         except (ValueError, RecursionError):
             content = None
         if not isinstance(content, dict) or set(content) != set(wanted) or not all(
-            isinstance(content[k], t) for k, t in wanted.items()
-        ):
+            type(content[k]) is t for k, t in wanted.items()
+        ) or not all(isinstance(point, str) for point in content["points"]):
             raise fastapi.HTTPException(422, f"expected JSON with {', '.join(wanted)}")
         answer = await asyncio.to_thread(_send, site, {"kind": kind, **content}, key)
         return replies.JSONResponse(answer, 503 if answer["error"] else 202)
@@ -114,6 +129,21 @@ def make_app(site: Site) -> Any:
         work.__annotations__["request"] = fastapi.Request
         app.post(path, dependencies=operator)(work)
     return app
+
+
+class _Fresh:
+    """Status of a site, asked for once in a while: who floods the page does not reach the guard."""
+
+    def __init__(self, site: Site) -> None:
+        self._site, self._lock = site, threading.Lock()
+        self._until, self._status = 0.0, dict[str, Any]()
+
+    def status(self) -> dict[str, Any]:
+        with self._lock:
+            if time.monotonic() >= self._until:
+                self._status = site_status(self._site)
+                self._until = time.monotonic() + KEPT
+            return self._status
 
 
 def site_status(site: Site) -> dict[str, Any]:
@@ -143,12 +173,10 @@ def _guard_status(site: Site) -> dict[str, Any]:
 
 
 def _send(site: Site, request: dict[str, Any], key: bytes) -> dict[str, Any]:
-    """Sign a request by the guard's clock, and hand it on."""
+    """Sign a request, and hand it on; its nonce is what the guard's answers name it by."""
     client = GuardClient(site.sockets)
+    signed = sign(request, key, site.clock().wall(), "page", float(site.limits()["tick"]))
     try:
-        told = client.ask({"kind": "status"})
-        if "wall" not in told:
-            return {"error": told.get("error") or "the guard does not answer"}
-        return client.ask(sign(request, key, float(told["wall"]), "page"))
+        return {"nonce": signed["nonce"]} | client.ask(signed)
     finally:
         client.close()

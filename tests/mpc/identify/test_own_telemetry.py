@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
+import yaml
 
 from mpc.baselines.plants import OwnControl
 from mpc.control.identified.controller import IdentifiedController
+from mpc.errors import PlantError
 from mpc.identify.identify import Identified, identify
 from mpc.identify.machines import find_machines
 from mpc.identify.telemetry import PlantTelemetry, Site, run_recorded
 from mpc.kpi.kpis import measure_kpis
+from mpc.studies.described import PlantStudy
 
 
 @pytest.fixture(scope="module")
@@ -65,3 +70,26 @@ def test_control_by_it_keeps_comfort_for_less(
     house = truth.House(days=1, start="2023-01-20")
     cost, cold = cost_of(IdentifiedController(without_commands.model, house.actuators, own.site.location))
     assert cost < 0.8 * before and cold < 0.3
+
+
+def test_a_real_building_has_its_machines_from_description_and_telemetry(tmp_path: Path) -> None:
+    """No program stands for it that could be asked."""
+    point = "north/zone_air_heating_temperature_setpoint"
+    text = {
+        "format": 1, "name": "hall", "plant": {"kind": "site"}, "control_step": 900.0,
+        "location": {"latitude": 50.8, "longitude": 4.35, "elevation": 100.0, "timezone": "Europe/Brussels"},
+        "period": {"start": "2026-01-12 00:00", "days": 1}, "zones": {"north": {"temperature": "x", "floor_area": 60.0}},
+        "actuators": {point: {"signal": "y", "range": ["16 degC", "26 degC"]}},
+    }  # fmt: skip
+    (tmp_path / "plant.yaml").write_text(yaml.safe_dump(text))
+    study = PlantStudy(tmp_path / "plant.yaml")
+    index = pd.date_range("2026-01-05", periods=2, freq="15min", tz="Europe/Brussels")
+    columns = ("north/zone_air_temperature_sensor", "north/heating_power_sensor", f"set/{point}")
+    seen = PlantTelemetry(pd.DataFrame(dict.fromkeys(columns, 290.0), index=index), 900.0, study.site)
+    (machine,) = study.seen_machines(seen)
+    assert machine.name == point and machine.heat == "north/heating_power_sensor" and machine.serves == ("north",)
+    assert (machine.actuator.lowest, machine.actuator.highest) == pytest.approx((289.15, 299.15))
+    del text["actuators"][point]["range"]  # type: ignore[attr-defined]
+    (tmp_path / "plant.yaml").write_text(yaml.safe_dump(text))
+    with pytest.raises(PlantError, match="range: expected a lowest and a highest value"):
+        PlantStudy(tmp_path / "plant.yaml").seen_machines(seen)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import dataclasses
 import threading
 from pathlib import Path
@@ -10,12 +11,20 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+import yaml
 
 from mpc.errors import HistorianError
+from mpc.live.clock import Clock
+from mpc.live.collector import Collector
 from mpc.live.historian.recorder import Recorder
 from mpc.live.historian.samples import Samples
 from mpc.live.historian.spool import Spool
 from mpc.live.historian.store import Historian, migrations
+from mpc.live.links.link import reading
+from mpc.live.site import Site
+from thermal.case.building import Building, Location, ZoneEntry, ZoneTable
+from thermal.errors import PlanError
+from thermal.intake.historian import historian_telemetry, pack_days
 
 START = pd.Timestamp("2026-01-10", tz="UTC")
 
@@ -129,3 +138,65 @@ def test_the_name_of_a_schema_is_no_way_in(schema: str) -> None:
     pytest.importorskip("psycopg", reason="needs the extra [live]")
     with pytest.raises(HistorianError, match="lower-case letters"):
         Historian("postgresql:///", schema=schema)
+
+
+class Readings:
+    """A connection that shows what the minute says, without a number in one of them."""
+
+    minute = 0
+
+    async def read(self, names: Any, slots: bool) -> dict[str, Any]:
+        return {name: reading(None if self.minute == 7 else 293.0 + 0.1 * self.minute) for name in names}
+
+
+def test_a_case_comes_of_what_the_collector_wrote_and_retention_takes_packed_days(
+    historian: Historian, tmp_path: Path
+) -> None:
+    plant = {
+        "format": 1, "name": "hall", "plant": {"kind": "site"}, "control_step": 300.0,
+        "location": {"latitude": 48.0, "longitude": 12.0, "elevation": 0.0, "timezone": "UTC"},
+        "period": {"start": "2026-01-12 00:00", "days": 1}, "zones": {"room": {"temperature": "x", "floor_area": 20.0}},
+    }  # fmt: skip
+    point, later = "room/zone_air_temperature_sensor", START + pd.Timedelta(days=40)
+    entry = {
+        "format": 1, "name": "hall", "plant": "plant.yaml", "controller": "full_speed",
+        "database": {"address": historian.address, "schema": historian.schema, "retention": 30},
+        "connections": {"hall": {"kind": "bacnet", "address": "127.0.0.1:9"}},
+        "points": {point: {"connection": "hall", "at": "analog-input,1"}},
+    }  # fmt: skip
+    (tmp_path / "plant.yaml").write_text(yaml.safe_dump(plant))
+    (tmp_path / "site.yaml").write_text(yaml.safe_dump(entry))
+
+    class Minutes(Clock):
+        now = START
+
+        def wall(self) -> float:
+            return float(self.now.timestamp())
+
+    clock, link = Minutes(), Readings()
+
+    async def collect() -> None:
+        collector = Collector(Site(tmp_path / "site.yaml"), clock)
+        for link.minute in range(1, 21):
+            clock.now = START + pd.Timedelta(minutes=link.minute)
+            await collector.collect({"hall": link})  # type: ignore[dict-item]
+        assert pack_days(historian.address, START + pd.Timedelta(days=1), historian.schema) == 1
+        found = read()
+        clock.now = later
+        await collector.collect({"hall": link})  # type: ignore[dict-item]
+        collector.log.close()
+        collector.recorder.historian.close()
+        room = found.telemetry.frame[point]
+        assert room.to_numpy() == pytest.approx(293.0 + 0.1 * np.array([3.0, (6 + 8 + 9 + 10) / 4.0, 13.0, 18.0]))
+
+    def read() -> Any:
+        site = Location(latitude=48, longitude=12, elevation=0, timezone="UTC")
+        table = ZoneTable((ZoneEntry(name="room", volume=50, floor_area=20),))
+        period = START, START + pd.Timedelta("20min")
+        return historian_telemetry(Building("hall", site, 0.0, table, ()), historian.address, period, 300.0,
+                                   schema=historian.schema)  # fmt: skip
+
+    asyncio.run(collect())
+    with pytest.raises(PlanError, match="expected samples"):  # older than the retention, packed or not
+        read()
+    assert historian.points()["samples"].tolist() == [1]

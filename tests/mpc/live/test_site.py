@@ -23,6 +23,7 @@ from mpc.live.notify import Notifier
 from mpc.live.operators import checked_request, operator_key, sign
 from mpc.live.outlook import Outlook
 from mpc.live.page.access import Access
+from mpc.live.picture import DayCost, picture
 from mpc.live.planner import Planner, forecast_of_dict, forecast_to_dict, needed_columns
 from mpc.live.site import NotifyEntry, Site
 from thermal.units import to_si
@@ -159,6 +160,31 @@ def test_plans_repeat_and_a_failure_is_a_status(tmp_path: Path) -> None:
     assert "ZeroDivisionError" in Planner(site, Bad(ZeroDivisionError("x"))).plan(inputs)["status"]
     assert Planner(site, Bad(1.0)).plan(inputs)["other"] == {"boiler/valve": 1.0}
     assert needed_columns(site) == ("north/zone_air_temperature_sensor",)
+
+
+def test_what_the_page_shows_of_a_plan_and_what_the_day_has_cost(tmp_path: Path) -> None:
+    site = make(tmp_path)
+    forecast = {"columns": ["electricity_price", "north/comfort_lower_temperature", "north/comfort_upper_temperature"],
+                "values": [[0.2, 0.4], [293.15, 291.15], [296.15, None]]}  # fmt: skip
+    inputs = {"begin": START.timestamp(), "forecast": forecast, "means": {"hp/electrical_power_sensor": 2000.0}}
+    ahead = {"step": 900.0, "zone": [[293.0], [293.5], [293.25]], "power": [[1000.0, 0.0], [4000.0, 0.0]]}
+    found = picture(site, {"number": 7, "ahead": ahead}, inputs)
+    assert found is not None and found["cost"] == pytest.approx(0.25 * (0.2 + 4 * 0.4))  # kWh of a quarter of an hour
+    assert found["zones"]["north"] == {"lower": [293.15, 291.15], "upper": [296.15, None], "expected": [293.0, 293.5, 293.25]}
+    assert picture(site, {"number": 8}, inputs)["power"] is None and picture(site, {}, {"forecast": None}) is None  # type: ignore[index]
+    assert DayCost(site).add(inputs) is None  # no meter
+    day = DayCost(site)
+    day.meters = ["hp/electrical_power_sensor"]
+    begin = START.timestamp()
+    assert day.add(inputs)["cost"] == 0.0  # type: ignore[index] # nobody knows what the step before cost
+    told = day.add(inputs | {"begin": begin + 900.0})
+    assert told is not None and told["cost"] == pytest.approx(0.5 * 0.2) and told["steps"] == 1
+    again = DayCost(site, told)
+    again.meters = day.meters
+    assert again.add(inputs | {"begin": begin + 900.0}) == told  # a new start counts nothing twice
+    assert again.add(inputs | {"begin": begin + 1800.0})["steps"] == 2  # type: ignore[index]
+    assert again.add(inputs | {"begin": begin + 3600.0})["steps"] == 2  # type: ignore[index] # a step is missing
+    assert again.add(inputs | {"begin": begin + 86_400.0})["steps"] == 0  # type: ignore[index]
 
 
 def test_measurements_that_bear_no_plan_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

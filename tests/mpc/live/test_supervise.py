@@ -14,7 +14,7 @@ from mpc.live.state import read_state
 from mpc.live.supervise import Supervisor
 
 
-def test_parts_are_started_anew_and_ended_guard_last(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_parts_are_started_anew_and_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(supervise, "_WAIT", 0.05)
     log = tmp_path / "log"
     text = ("import signal, sys, time; log = open({log!r}, 'a', buffering=1); log.write('+{part}\\n')\n"

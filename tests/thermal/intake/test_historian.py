@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from mpc.live.historian.store import Historian
 from thermal import load_case, save_case
 from thermal.case.building import Building, Device, Location, ZoneEntry, ZoneTable
 from thermal.case.case import Case
@@ -18,11 +19,6 @@ from thermal.intake.historian import historian_telemetry, pack_days, read_histor
 
 START, END = pd.Timestamp("2026-01-05", tz="Europe/Berlin"), pd.Timestamp("2026-01-08", tz="Europe/Berlin")
 ROOM, DAMPER, FLOW = "room/zone_air_temperature_sensor", "V1/supply_air_damper_percentage_command", "V1/supply_air_flowrate_sensor"  # fmt: skip
-SCHEMA = """
-CREATE TABLE point (id integer GENERATED ALWAYS AS IDENTITY PRIMARY KEY, name text NOT NULL UNIQUE, unit text);
-CREATE TABLE sample (point integer NOT NULL REFERENCES point (id), time timestamptz NOT NULL,
-                     value double precision NOT NULL, PRIMARY KEY (point, time));
-"""  # as live operation makes them
 
 
 @pytest.fixture(scope="module")
@@ -45,9 +41,9 @@ def historian(postgres: str, samples: dict[str, pd.Series]) -> str:
 
     with psycopg.connect(postgres, autocommit=True) as connection:
         for schema in ("buildingmpc", "late"):
-            connection.execute(f"CREATE SCHEMA {schema}")  # type: ignore[arg-type]
+            with Historian(postgres, schema) as own:
+                own.migrate()
             connection.execute(f"SET search_path = {schema}")  # type: ignore[arg-type]
-            connection.execute(SCHEMA)
             ids = {}
             for name in (*samples, "silent/zone_air_temperature_sensor"):
                 found = connection.execute("INSERT INTO point (name) VALUES (%s) RETURNING id", [name]).fetchone()
