@@ -168,7 +168,7 @@ class BatchedPlant:
             self._start(number, who[which == number])
         return self.measured
 
-    def start(self, modal_state: FloatArray, inputs: Mapping[str, FloatArray], **states: float) -> None:
+    def start(self, modal_state: FloatArray, inputs: Mapping[str, FloatArray], states: Mapping[str, float]) -> None:
         """Start all members of the first plant from an estimated state, with inputs of a horizon in place of its own.
 
         Parameters
@@ -176,8 +176,8 @@ class BatchedPlant:
         modal_state : ndarray, shape (order,)
             Modes of its building, as an observer has them [K].
         inputs : mapping of str to ndarray, shape (n_steps, width)
-            Parts of `mpc.batch.inputs.plant_rows`, as there.
-        **states : float
+            Parts of `mpc.batch.inputs.plant_rows`, as there [any].
+        states : mapping of str to float
             Of the HVAC system, as `HvacSystem.start` takes them [unit of the state].
 
         Raises

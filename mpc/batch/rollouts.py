@@ -72,7 +72,7 @@ class HorizonRollouts:
         """
         problem, batch, horizon = self.problem, self.batch, self.problem.predictor.horizon
         ControlError.unless(data.heat_value == 0.0, "sampled plans", "a heat value of 0", f"{data.heat_value:g}")
-        batch.start(data.state, self._rows(data), **dict.fromkeys(self._water, data.water))
+        batch.start(data.state, self._rows(data), dict.fromkeys(self._water, data.water))
         plans = np.stack([problem.plan(row) for row in shares], axis=-1)  # (n_block, n_channel, n)
         for block in horizon.block_of.tolist():
             batch.step(plans[block, self._channel_of])

@@ -219,9 +219,9 @@ def copied(value: Any, out: FloatArray) -> None:
     Parameters
     ----------
     value : ndarray or float
-        Any.
+        Any [any].
     out : ndarray
-        Filled.
+        Filled [any].
     """
     np.copyto(out, value)
 
@@ -232,9 +232,9 @@ def where(mask: Any, first: Any, second: Any, out: FloatArray) -> None:
     Parameters
     ----------
     mask, first, second : ndarray or float
-        Truth values, and any [-].
+        Truth values [-], and any [any].
     out : ndarray
-        Filled.
+        Filled [any].
     """
     np.copyto(out, second)
     np.copyto(out, first, where=mask)

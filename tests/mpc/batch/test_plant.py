@@ -163,7 +163,7 @@ def test_members_start_from_a_state_with_inputs_of_their_own() -> None:
     state, water = plant.model.modal_state, plant.loop.save().hvac.values[0]  # type: ignore[attr-defined]
     inputs = {name: values[24:60] for name, values in plant_rows(plant).items()}
     batch = BatchedPlant(plant, 2, dtype=np.float64)
-    batch.start(state, inputs, supply_water_temperature=water)
+    batch.start(state, inputs, {"supply_water_temperature": water})
     np.testing.assert_allclose(batch.zone_temperature[:, 0], plant.record().zone_temperature[-1], atol=EXACT)
     for row in rows[24:]:
         plant.step(dict(zip(batch.actions, row[:, 0].tolist(), strict=True)))
@@ -172,4 +172,4 @@ def test_members_start_from_a_state_with_inputs_of_their_own() -> None:
     assert np.abs(apart).max() < 0.1  # what local control had missed before is not part of the state
     assert np.ptp(plant.record().zone_temperature[24:], axis=0).max() > 1.0
     with pytest.raises(PlantError, match="order"):
-        batch.start(state[1:], inputs)
+        batch.start(state[1:], inputs, {})
