@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal.batch.trace import copied, where
+from thermal.batch.carried import copied, where
 from thermal.errors import MissingExtraError
 
 _EXPRESSIONS: dict[Any, str] = {

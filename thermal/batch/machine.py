@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal._types import IntArray
+from thermal.batch.carried import Reduce, Take, copied, where
 from thermal.batch.compiled import Instruction, work_place
-from thermal.batch.trace import Reduce, Take, copied, where
 
 _OPERATIONS: dict[Any, Callable[..., Any]] = {
     np.add: operator.add, np.subtract: operator.sub, np.multiply: operator.mul, np.divide: operator.truediv,

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
-from thermal._types import FloatArray
+from thermal.batch.carried import Reduce, Take, copied, where
 from thermal.components.operations import Value
 from thermal.errors import ModelError
 
@@ -211,68 +211,6 @@ def _key(operand: Any) -> Any:
     if isinstance(operand, np.ndarray):
         return ("array", id(operand))
     return ("view", operand.slot.number, repr(operand.path)) if isinstance(operand, View) else ("number", operand)
-
-
-def copied(value: Any, out: FloatArray) -> None:
-    """Copy a value.
-
-    Parameters
-    ----------
-    value : ndarray or float
-        Any [any].
-    out : ndarray
-        Filled [any].
-    """
-    np.copyto(out, value)
-
-
-def where(mask: Any, first: Any, second: Any, out: FloatArray) -> None:
-    """Take the first value where the mask is true, the second elsewhere.
-
-    Parameters
-    ----------
-    mask, first, second : ndarray or float
-        Truth values [-], and any [any].
-    out : ndarray
-        Filled [any].
-    """
-    np.copyto(out, second)
-    np.copyto(out, first, where=mask)
-
-
-class Reduce(NamedTuple):
-    """A reduction over an axis, such as a sum.
-
-    Parameters
-    ----------
-    function : numpy.ufunc
-        Of two values.
-    axis : int
-        Of one member's values.
-    """
-
-    function: Any
-    axis: int
-
-    def __call__(self, values: FloatArray, out: FloatArray) -> None:
-        """Carry it out; see `Instruction`."""
-        self.function.reduce(values, axis=self.axis, out=out)
-
-
-class Take(NamedTuple):
-    """Rows by number.
-
-    Parameters
-    ----------
-    rows : tuple of int
-        Which.
-    """
-
-    rows: tuple[int, ...]
-
-    def __call__(self, values: FloatArray, out: FloatArray) -> None:
-        """Carry it out; see `Instruction`."""
-        np.take(values, self.rows, axis=0, out=out, mode="clip")
 
 
 class Traced(NDArrayOperatorsMixin):
