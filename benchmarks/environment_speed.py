@@ -52,6 +52,7 @@ def measure(world: ControlEnvironment, episodes: int = EPISODES, steps: int = ST
         rates = []
         for episode in range(episodes):
             world.reset(seed=episode, options={"plant": 0})
+            plant.reset(episode)
             begin = time.process_time()
             for k in range(steps):
                 take(k)
