@@ -233,7 +233,10 @@ def _refits(work: Work, gains: Sequence[Gain], ahead: Refit | None) -> list[Refi
             kept = 0.0 if tries[0] is None else tries[0].gain
             if g is gains[0] and kept < _KEPT * g.gain:  # a calibrated θ may have hidden it
                 tries.append(work.refit([g], work.accepted | dict(g.strengths)))
-            found.extend(sorted((t for t in tries if t is not None), key=lambda t: -t.gain)[:1])
+            if g.zones == ALIKE:
+                apart = (w for w in work.made.ways(g.effect) if w.zones != ALIKE and w.gain > LEAST_GAIN)
+                tries.extend(work.refit([w], work.made.promised(w)) for w in apart)
+            found.extend(_best_of(work, [t for t in tries if t is not None]))
     best = max((r for r in found if r.counts), key=lambda r: r.gain, default=None)
     if best is not None and best.screened.zones:
         fitted = {r.screened.effect for r in found} | {WINDOWS}  # these are sought anew, not only fitted: `look_again`
@@ -245,6 +248,17 @@ def _refits(work: Work, gains: Sequence[Gain], ahead: Refit | None) -> list[Refi
                 other = work.refit([replace(g, zones=best.screened.zones)], work.accepted)
                 found.extend([] if other is None else [other])
     return sorted(found, key=lambda r: -r.gain)
+
+
+def _best_of(work: Work, tries: Sequence[Refit]) -> list[Refit]:
+    """Choose among fits of one effect: by gain, and whether zones are alike by their held-out days too.
+
+    The name is the same either way, but a model with one strength where zones differ predicts worse, and loses to a
+    structure that is free in each zone, and the name with it (a practice case with air between zones).
+    """
+    both = len({t.screened.zones == ALIKE for t in tries}) > 1
+    worth = [t.gain + (_held_out_gain(work.held_out, t) if both else 0.0) for t in tries]
+    return [tries[int(np.argmax(worth))]] if tries else []
 
 
 def _best_pair(

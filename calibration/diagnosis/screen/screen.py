@@ -152,14 +152,22 @@ class Screening:
         effect : str
             Its id.
         """
-        if effect == GENERIC.id:
-            return self._likeliest()
+        return self._likeliest() if effect == GENERIC.id else self.ways(effect)[0]
+
+    def ways(self, effect: str) -> list[Gain]:
+        """Gains of an effect in each way in which it may be there, the best first.
+
+        Parameters
+        ----------
+        effect : str
+            Its id.
+        """
         if not CATALOGUE[effect].zonal:
-            return self._gain(effect, self.strengths_of(effect), ())
+            return [self._gain(effect, self.strengths_of(effect), ())]
         members, everywhere = self.members_of(effect)
         found = [self._grow(effect, members)] if members else []
         found += [self._gain(effect, index, zones) for zones, index in everywhere.items()]
-        return max(found, key=lambda g: g.gain)
+        return sorted(found, key=lambda g: -g.gain)
 
     def members_of(self, effect: str) -> tuple[dict[str, IntArray], dict[tuple[str, ...], IntArray]]:
         """Positions of an effect's strengths by zone or pair of zones, those that show nothing left out.
