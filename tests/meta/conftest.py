@@ -69,6 +69,8 @@ class Project:
                 if parts[-1] != "__main__":
                     self.modules[name] = importlib.import_module(name)
             except Exception as error:  # a module that is half written fails one test, not all of them
+                if "buildingmpc[rl]" in str(error):  # Stable-Baselines3 is too large for the test extra
+                    continue
                 self.broken.append(f"{self.where(name)}: cannot be imported: {type(error).__name__}: {error}")
 
     def where(self, name: str, line: int = 1) -> str:
