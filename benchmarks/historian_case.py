@@ -11,15 +11,12 @@ from __future__ import annotations
 
 import argparse
 import resource
-import shutil
-import subprocess
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pandas as pd
+from _postgres import PostgresServer
 from _table import markdown, write
 
 from mpc.live.historian.store import Historian
@@ -34,21 +31,8 @@ _OF_DEVICE = ("zone_air_temperature_sensor", "supply_air_flowrate_sensor", "disc
               "zone_air_heating_temperature_setpoint", "zone_air_cooling_temperature_setpoint",
               "heating_power_sensor")  # fmt: skip
 
-@contextmanager
-def postgres(folder: Path) -> Iterator[str]:
-    """Run a server of Debian's PostgreSQL on a socket in a folder, as the user postgres where this one is root."""
-    binaries = sorted(Path("/usr/lib/postgresql").glob("*/bin"))[-1]
-    shutil.chown(folder, "postgres")
-    as_user = ["runuser", "-u", "postgres", "--"]
-    run = [*as_user, str(binaries / "initdb"), "-D", str(folder / "data"), "-U", "tester", "-A", "trust", "--no-sync"]
-    subprocess.run(run, check=True, capture_output=True)
-    options = f"-k {folder} -c listen_addresses='' -c fsync=off -c shared_buffers=512MB -c max_wal_size=8GB"
-    control = [*as_user, str(binaries / "pg_ctl"), "-D", str(folder / "data"), "-w", "-l", str(folder / "log")]
-    subprocess.run([*control, "-o", options, "start"], check=True, capture_output=True)
-    try:
-        yield f"postgresql://tester@/postgres?host={folder}"
-    finally:
-        subprocess.run([*control, "-m", "immediate", "stop"], check=True, capture_output=True)
+#: Of a server that keeps the samples in memory.
+MEMORY = "-c shared_buffers=512MB -c max_wal_size=8GB"
 
 
 def fill(address: str, building: Building, days: int) -> None:
@@ -79,7 +63,10 @@ def main() -> None:
     end = START + pd.Timedelta(days=arguments.days)
     with tempfile.TemporaryDirectory() as work:
         Path(work).chmod(0o755)
-        with postgres(Path(tempfile.mkdtemp(dir=work))) as address:
+        server = PostgresServer(Path(tempfile.mkdtemp(dir=work)), MEMORY)
+        server.start()
+        try:
+            address = server.address
             fill(address, building, arguments.days)
             for kind in ("as they come", "packed"):
                 if kind == "packed":
@@ -94,6 +81,8 @@ def main() -> None:
                 memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
                 rows.append([kind, found.telemetry.frame.shape[1], samples, read, cpu, samples / read / 1e6,
                              read / arguments.days * 365, saved, memory])  # fmt: skip
+        finally:
+            server.stop()
     heads = ["days", "points", "samples", "read [s]", "of it our CPU [s]", "million samples a second",
              "a year at that rate [s]", "checked and saved [s]", "most memory [GB]"]  # fmt: skip
     table = f"{arguments.days} days.\n\n{markdown(heads, rows)}"

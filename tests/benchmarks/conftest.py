@@ -1,4 +1,4 @@
-"""Modules of the benchmarks, which are scripts of one folder and no package."""
+"""Packages that lie beside the scripts of the benchmarks."""
 
 from __future__ import annotations
 
@@ -12,21 +12,6 @@ from types import ModuleType
 import pytest
 
 SCRIPTS = Path(__file__).parents[2] / "benchmarks"
-
-
-@pytest.fixture(scope="session")
-def script() -> Callable[[str], ModuleType]:
-    """Load a script by the name that its neighbours import it by; what it imports from them comes first."""
-
-    def load(name: str) -> ModuleType:
-        if name not in sys.modules:
-            spec = importlib.util.spec_from_file_location(name, SCRIPTS / f"{name}.py")
-            assert spec is not None and spec.loader is not None
-            sys.modules[name] = module = importlib.util.module_from_spec(spec)
-            spec.loader.exec_module(module)
-        return sys.modules[name]
-
-    return load
 
 
 @pytest.fixture(scope="session")

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import os
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import pytest
@@ -79,14 +80,12 @@ def test_logs_are_replayed_in_order(tmp_path: Path) -> None:
     assert run("replay", tmp_path / "none.jsonl")[0] == 2
 
 
-def test_a_guard_of_the_command_gives_back_and_listens(tmp_path: Path) -> None:
+def test_a_guard_of_the_command_gives_back_and_listens(
+    tmp_path: Path, script: Callable[[str], ModuleType]
+) -> None:
     pytest.importorskip("rusty_bacnet", reason="needs a BACnet device of another stack: pip install rusty-bacnet")
     pytest.importorskip("bacpypes3", reason="needs the extra [live]")
-    spec = importlib.util.spec_from_file_location("_bacnet_site", ROOT / "benchmarks" / "_bacnet_site.py")
-    assert spec is not None and spec.loader is not None
-    sys.modules.setdefault("_bacnet_site", module := importlib.util.module_from_spec(spec))
-    spec.loader.exec_module(module)
-    device = module.SimulatedSite(100.0)
+    device = script("_bacnet_site").SimulatedSite(100.0)
     path = make(tmp_path, device.start(), "advise")
     device.operate(1, 22.0, 13)  # what a guard left that was killed
     end = time.monotonic() + 60.0

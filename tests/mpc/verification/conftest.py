@@ -2,27 +2,18 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 
-GENERATOR = Path(__file__).parents[3] / "benchmarks" / "_metered_days.py"
-
 
 @pytest.fixture(scope="session")
-def make_days() -> Callable[..., pd.DataFrame]:
+def make_days(script: Callable[[str], Any]) -> Callable[..., pd.DataFrame]:
     """Make days of metered energy."""
-    spec = importlib.util.spec_from_file_location("_metered_days", GENERATOR)
-    assert spec is not None and spec.loader is not None
-    sys.modules["_metered_days"] = module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module.metered_days  # type: ignore[no-any-return]
+    return script("_metered_days").metered_days  # type: ignore[no-any-return]
 
 
 @pytest.fixture(scope="session")

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
@@ -23,21 +22,11 @@ TABLE = ZoneTable((ZoneEntry(name="hall", volume=50, floor_area=20), ZoneEntry(n
 HOUSE = Building("house", SITE, 0.0, TABLE, (Device(name="VAV_1", type="vav", zone="hall"), Device(name="AHU_1", type="ahu")))  # fmt: skip
 
 
-def names() -> ModuleType:
-    """Generator of names, which the benchmark uses too."""
-    file = Path(__file__).parents[3] / "benchmarks" / "_network_names.py"
-    spec = importlib.util.spec_from_file_location("_network_names", file)
-    assert spec is not None and spec.loader is not None
-    sys.modules["_network_names"] = module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 @pytest.mark.parametrize("habit", ["contractor", "integrator", "opaque"])
-def test_generated_names_of_three_habits(habit: str) -> None:
+def test_generated_names_of_three_habits(habit: str, script: Callable[[str], ModuleType]) -> None:
     building, counts = pilot_building(1, floor_area=600.0, zones=12, name="office"), Counter[str]()
     for seed in (30, 31):
-        listed = list(names().network_points(building, habit, seed))
+        listed = list(script("_network_names").network_points(building, habit, seed))
         truth = {point.address: what for point, what in listed}
         found = propose([point for point, _ in listed], building)
         assert len(found.points) == len(listed)  # none is left out
