@@ -117,25 +117,28 @@ class _Process:
             env={**os.environ, **ONE_THREAD},
             start_new_session=True,
         )
+        self._asked = Lock()
 
     def ask(self, message: bytes) -> bytes:
         """Send a call and wait for its answer."""
         requests, replies = self._popen.stdin, self._popen.stdout
-        if requests is None or replies is None:
-            raise EOFError
-        pickle.dump(message, requests)
-        requests.flush()
-        answer: bytes = pickle.load(replies)
-        return answer
+        with self._asked:
+            if requests is None or replies is None or replies.closed:
+                raise EOFError
+            pickle.dump(message, requests)
+            requests.flush()
+            answer: bytes = pickle.load(replies)
+            return answer
 
     def kill(self) -> None:
-        """End the process at once."""
+        """End the process at once, and whoever waits for its answer."""
         self._popen.kill()
         self._popen.wait()
-        for pipe in (self._popen.stdin, self._popen.stdout):
-            if pipe is not None:
-                with suppress(OSError):  # flushing what a dead reader will not take
-                    pipe.close()
+        with self._asked:  # a pipe is not closed under a thread that reads it: the end of the process wakes that thread
+            for pipe in (self._popen.stdin, self._popen.stdout):
+                if pipe is not None:
+                    with suppress(OSError):  # flushing what a dead reader will not take
+                        pipe.close()
 
     def end(self) -> str:
         """Clear away a process that stopped answering, and say how it ended."""
