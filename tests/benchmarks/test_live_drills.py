@@ -70,4 +70,4 @@ def test_real_drills(drills: ModuleType, script: Callable[[str], ModuleType]) ->
         assert not one["late"], one  # a control step is 1.5 s: a machine that stands still for a second fails here
     assert found["lost"] == 0 and found["samples"] > 50 and found["writes"] > 5
     assert found["not_replayed"] == [] and found["decisions"] > 25
-    assert "| all | 3 | 0 | 0 | 0 | 0 | 0 |" in drills.report(found)
+    assert "| all | 3 | 0 | 0 | 0 | 0 | 0 |" in drills.report(drills.together([found], 1))
