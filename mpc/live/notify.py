@@ -53,11 +53,22 @@ class Notifier:
         kinds = {_NUMBERS.sub("#", alarm): alarm for alarm in alarms}
         fresh = [alarm for kind, alarm in kinds.items() if kind not in self._known]
         self._known = set(kinds)
-        if fresh and (self.entry.webhook or self.entry.mail):
-            threading.Thread(target=self._send, args=(fresh, wall), daemon=True).start()
+        if fresh:
+            threading.Thread(target=self.send, args=(fresh, wall), daemon=True).start()
         return fresh
 
-    def _send(self, alarms: Sequence[str], wall: float) -> None:
+    def send(self, alarms: Sequence[str], wall: float) -> None:
+        """Send alarms, and wait until it is done.
+
+        Parameters
+        ----------
+        alarms : sequence of str
+            One at least.
+        wall : float
+            Wall clock, since 1970 in UTC [s].
+        """
+        if not (self.entry.webhook or self.entry.mail):
+            return
         time = datetime.fromtimestamp(wall, UTC).isoformat(timespec="seconds")
         try:
             if self.entry.webhook:
