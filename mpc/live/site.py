@@ -380,6 +380,11 @@ class Site:
             known = kind in POINT_TYPES or point in self.plant.actuators
             LiveError.unless("/" in point and known, where, expected, repr(point), advice)
             bacnet = isinstance(file.connections[entry.connection], BacnetLink)
+            topics = entry.at.split()
+            plain = len(topics) in (1, 2) and not set("+#\0") & set(entry.at)
+            LiveError.unless(
+                bacnet or plain, f"{where}.at", "a topic to read, and one to write to, without + and #", repr(entry.at)
+            )
             found = f"release {entry.release!r} on {file.connections[entry.connection].kind}"
             LiveError.unless(
                 bacnet or entry.release != "relinquish", f"{where}.release", "a value where there are no priorities",
