@@ -178,7 +178,7 @@ def _weather(building: Building, seed: int, rng: np.random.Generator, days: int)
         station=building.weather_station,
     )  # fmt: skip
     index = pd.DatetimeIndex(weather.index)
-    year = np.cos(2.0 * np.pi * (index.dayofyear.to_numpy() - 15.0) / 365.25)
+    year = np.cos(2.0 * np.pi * (index.day_of_year.to_numpy() - 15.0) / 365.25)
     colder = rng.uniform(-2.0, 6.0) + rng.uniform(0.0, 7.0) * year
     weather[f"{building.weather_station}/outside_air_temperature_sensor"] -= np.round(colder, 3)
     return weather
@@ -329,7 +329,7 @@ def _boundary(building: Building, network: ThermalNetwork, weather: pd.DataFrame
 def _people(rng: np.random.Generator, index: pd.DatetimeIndex, zones: int) -> Array:
     """Presence: a course for each zone and day, with days off that no calendar has."""
     middle = index - pd.Timedelta(seconds=STEP / 2)
-    hour, day = np.asarray(middle.hour + middle.minute / 60.0), np.asarray(middle.dayofyear + 366 * middle.year)
+    hour, day = np.asarray(middle.hour + middle.minute / 60.0), np.asarray(middle.day_of_year + 366 * middle.year)
     present = np.zeros((len(index), zones))
     for number in np.unique(day):
         rows = np.flatnonzero(day == number)
