@@ -1,9 +1,9 @@
 """A historian of 890 points at one minute, read as a case: how fast, plain and packed, and how much memory.
 
 A PostgreSQL server of its own is filled with some days of the pilot building's points, as live operation's tables have
-them. The case is made as `buildingmpc case from` makes it, at steps of 5 minutes. Of samples as they come, and of packed
-ones at steps that are no whole slots, a year is so many days at the same rate. The year of packed slots is a whole one
-on disk: its days are those of the first one again, since 468 million samples beneath them would be read by nobody.
+them. The case is made as `buildingmpc case from` makes it, at steps of 5 minutes. Of samples as they come, and of
+packed ones at steps that are no whole slots, a year is so many days at the same rate. The year of packed slots is
+whole on disk: its days are the first one again, for 468 million samples beneath them would be read by nobody.
 
 Run: ``python benchmarks/historian_case.py --days 2 --publish --out results/historian``; some minutes.
 """
