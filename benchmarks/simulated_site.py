@@ -50,6 +50,8 @@ points:
   weather_station/outside_air_temperature_sensor: {{connection: hall, at: "analog-input,1", unit: degC}}
   north/zone_air_temperature_sensor: {{connection: hall, at: "analog-input,2", unit: degC}}
   south/zone_air_temperature_sensor: {{connection: hall, at: "analog-input,3", unit: degC}}
+  north/heating_power_sensor: {{connection: hall, at: "analog-input,4", unit: W}}
+  south/heating_power_sensor: {{connection: hall, at: "analog-input,5", unit: W}}
   north/zone_air_heating_temperature_setpoint:
     {{connection: hall, at: "analog-value,1", unit: degC, mode: advise, range: [18 degC, 23 degC], rate: 2.0,
      release: relinquish}}

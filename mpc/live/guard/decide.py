@@ -13,6 +13,8 @@ A tick is what the guard saw at one time, in plain types:
     knows none) and ``error`` (empty where it could be read).
 ``results``
     By point: what became of the orders of the tick before; empty is well.
+``ordered``
+    Monotonic time at which these orders were done, or None [s]: a rate counts from there, not from the decision.
 ``stopping``
     Whether the guard is being ended.
 
@@ -189,6 +191,7 @@ class Guard:
                 state.giving_back[name] = value
             elif name not in state.giving_back:
                 state.held[name] = value
+                state.written[name] = tick["ordered"]
         return doubts
 
     def _readings(self, tick: Tick, why: dict[str, str]) -> list[str]:

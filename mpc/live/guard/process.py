@@ -65,6 +65,7 @@ class GuardProcess:
         )  # fmt: skip
         self.mailbox = Mailbox(operator_key(site.folder), self.clock.mono)
         self._results: dict[str, str] = {}
+        self._ordered: float | None = None
         self._pace = Pace(self.clock)
         self._notifier = Notifier(site.file.notify, site.file.name)
         self._status: dict[str, Any] = {}
@@ -117,12 +118,13 @@ class GuardProcess:
         readings = await self._read()
         tick = {
             "mono": self.clock.mono(), "wall": self.clock.wall(), "beat": self.mailbox.beat, "stopping": stopping,
-            "messages": self.mailbox.empty(), "readings": readings, "results": self._results,
+            "messages": self.mailbox.empty(), "readings": readings, "results": self._results, "ordered": self._ordered,
         }  # fmt: skip
         tick = json.loads(json.dumps(tick))  # what is decided on is what the log will say
         decision = self.guard.decide(tick)
         digest = self.log.append("tick", {"tick": tick, "decision": decision})
         self._results = await self._order(decision["writes"], decision["releases"])
+        self._ordered = self.clock.mono()
         plan = self.guard.state.plan
         known = decision["answers"] | self._answers  # a request that is repeated does not change its first answer
         self._answers = dict(list((self._answers | known).items())[-_ANSWERS:])

@@ -30,7 +30,7 @@ def guarded(folder: Path, ticks: int = 6) -> Path:
         plan = {"number": 1, "made": 60.0, "configuration": "c" * 64, "status": "planned", "values": {SET: 290.1 + 0.2},
                 "inputs": {}}  # fmt: skip
         tick = {
-            "mono": 60.0 * k, "wall": 60.0 * k, "beat": 60.0 * min(k, 3), "stopping": False, "results": {SET: ""},
+            "mono": 60.0 * k, "wall": 60.0 * k, "beat": 60.0 * min(k, 3), "stopping": False, "results": {SET: ""}, "ordered": 60.0 * k - 60.0,
             "messages": [{"kind": "plan", "plan": plan}] if k == 1 else [],
             "readings": {SET: {"value": 290.0, "slots": dict(slots), "error": ""}},
         }  # fmt: skip

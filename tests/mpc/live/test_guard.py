@@ -39,6 +39,7 @@ class Bench:
         self.errors: dict[str, str] = {}
         self.results: dict[str, str] = {}
         self.refuse: dict[str, str] = {}
+        self.ordered, self.late = 1000.0, 0.0
         self.values: dict[str, Any] | None = {SET: 290.05, VALVE: 0.6, PLAIN: 295.0}
         self.change: dict[str, Any] = {}
         self.zone, self.silent, self.ticks = 293.0, False, []
@@ -66,12 +67,12 @@ class Bench:
         sent = ([{"kind": "plan", "plan": self.plan()}] if plan and self.values is not None else []) + list(messages)
         tick = {
             "mono": self.now, "wall": self.wall, "beat": None if self.silent else self.now - 10.0, "messages": sent,
-            "readings": self.readings(), "results": dict(self.results), "stopping": False,
+            "readings": self.readings(), "results": dict(self.results), "ordered": self.ordered, "stopping": False,
         } | change  # fmt: skip
         tick = json.loads(json.dumps(tick))
         decision = json.loads(json.dumps(self.guard.decide(tick)))
         self.ticks.append((copy.deepcopy(tick), decision))
-        self.results = {}
+        self.results, self.ordered = {}, self.now + self.late
         for name, value in {**dict.fromkeys(decision["releases"]), **decision["writes"]}.items():
             self.results[name] = self.refuse.get(name, "")
             if self.results[name]:
@@ -112,6 +113,11 @@ def test_a_value_is_written_once_and_moves_at_its_rate() -> None:
     bench.values = {SET: 294.0, VALVE: 0.6, PLAIN: 295.0}
     seen = [bench.tick(plan=True)["writes"][SET] for _ in range(5)]
     np.testing.assert_allclose(np.diff(seen), 6.0 / 60.0)  # 6 K/h, a minute a tick
+    bench.late = 50.0  # a machine that stood still had its write out 50 s after the decision, 10 s before the next
+    seen.append(bench.tick(plan=True)["writes"][SET])
+    bench.late = 0.0
+    seen += [bench.tick(plan=True)["writes"][SET] for _ in range(2)]
+    np.testing.assert_allclose(np.diff(seen)[-3:], np.array([60.0, 10.0, 60.0]) * 6.0 / 3600.0)
 
 
 @pytest.mark.parametrize(
