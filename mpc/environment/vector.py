@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mpc.batch.inputs import DrivingRows
 from mpc.batch.plant import BatchedPlant, checked_plants, record_of
 from mpc.environment.environment import ControlEnvironment, Course, draw_episode
-from mpc.environment.features import clock
+from mpc.environment.features import LARGEST, clock
 from mpc.environment.layout import Observation
 from mpc.environment.render import RenderedRun
 from mpc.environment.reward import BatchReward
@@ -300,4 +300,4 @@ def seen_rows(course: Course, plant: SimulatedPlant) -> dict[str, FloatArray]:
     expected, advice = "plants with a forecaster, or block_ends=None", "pass horizon=... in PlantSettings"
     MpcError.unless(course.outlook is None or ahead is not None, "outlook", expected, "none", advice)
     rows = np.zeros((len(edges), 0)) if ahead is None else ahead[np.minimum(np.arange(len(edges)), len(ahead) - 1)]
-    return {"ahead": rows, "clock": now}
+    return {"ahead": np.clip(rows, -LARGEST, LARGEST), "clock": now}

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from thermal.batch.trace import Instruction, Slot, View
+from thermal.batch.trace import Instruction, View
 
 #: Instructions in a loop at most: compilers take more than twice as long for twice as many.
 LONGEST = 160
@@ -109,6 +109,37 @@ def in_loops(notes: Sequence[Instruction], members: int, fits: Callable[[Instruc
     return loops
 
 
+def taken_apart(notes: Sequence[Instruction], members: int, fits: Callable[[Instruction], bool]) -> list[Instruction]:
+    """Take arithmetic on several arrays at once apart, so that it shares loops with that on each of them.
+
+    Parameters
+    ----------
+    notes, members, fits
+        As in `in_loops`.
+    """
+    shapes: dict[int, Any] = {}
+    found = list[Instruction]()
+    for note in notes:
+        shape = _array(note.output, members, shapes)[1].shape
+        if not fits(note) or len(shape) < 3:
+            found.append(note)
+            continue
+        for k in range(shape[0]):
+            inputs = tuple(_part(value, k, len(shape), members, shapes) for value in note.inputs)
+            output = note.output._replace(path=(*note.output.path, k))
+            found.append(note._replace(inputs=inputs, output=output, partial=True))
+    return found
+
+
+def _part(value: Any, number: int, dimensions: int, members: int, shapes: dict[int, Any]) -> Any:
+    """Give the part of an operand that an element of the first axis has to do with."""
+    array = _array(value, members, shapes)[1] if isinstance(value, View) else value
+    if not isinstance(array, np.ndarray) or array.ndim < dimensions:
+        return value
+    index = number if len(array) > 1 else 0
+    return value._replace(path=(*value.path, index)) if isinstance(value, View) else array[index]
+
+
 def kept_within(loops: Sequence[Loop], kept: set[int]) -> set[int]:
     """Find slots that no other loop has to do with than the one that makes them: they need no memory.
 
@@ -119,17 +150,15 @@ def kept_within(loops: Sequence[Loop], kept: set[int]) -> set[int]:
     kept : set of int
         Slots that outlive a run.
     """
-    places, partial, calls = defaultdict[int, set[int]](set), set[int](), set[int]()
+    places, calls = defaultdict[int, set[int]](set), set[int]()
     for number, loop in enumerate(loops):
         for note in loop.notes:
             views = [*(v for v in note.inputs if isinstance(v, View)), note.output]
             for view in views:
                 places[view.slot.number].add(number)
-                if view.path:
-                    partial.add(view.slot.number)
             if loop.axes is None:
                 calls |= {view.slot.number for view in views}
-    return {slot for slot, where in places.items() if len(where) == 1} - kept - partial - calls
+    return {slot for slot, where in places.items() if len(where) == 1} - kept - calls
 
 
 def _fill(
@@ -161,18 +190,9 @@ def _accesses(
     note: Instruction, members: int, plain: bool, shapes: dict[int, Any]
 ) -> tuple[Axes, list[Access]]:
     """Give the axes of an instruction, and what it reads and writes."""
-    def array(view: View) -> Any:
-        whole = shapes.setdefault(view.slot.number, _blank(view.slot, members))
-        part = whole
-        for index in view.path:
-            part = part[index]
-        return whole, part
-
-    output = array(note.output)[1]
-    shape = output.shape
-    found = []
+    shape, found = _array(note.output, members, shapes)[1].shape, []
     for view, writes in [*((v, False) for v in note.inputs if isinstance(v, View)), (note.output, True)]:
-        whole, part = array(view)
+        whole, part = _array(view, members, shapes)
         first = part.__array_interface__["data"][0] - whole.__array_interface__["data"][0]
         last = first + sum((n - 1) * s for n, s in zip(part.shape, part.strides, strict=True))
         strides = None
@@ -183,8 +203,15 @@ def _accesses(
     return (tuple(n for n in shape[:-1] if n > 1), shape[-1]), found
 
 
-def _blank(slot: Slot, members: int) -> Any:
-    return np.empty((*slot.shape, members if slot.each else 1), dtype=np.int8)
+def _array(view: View, members: int, shapes: dict[int, Any]) -> tuple[Any, Any]:
+    """Give stand-ins of a slot and of a part of it, a byte an element."""
+    slot = view.slot
+    if slot.number not in shapes:
+        shapes[slot.number] = np.empty((*slot.shape, members if slot.each else 1), dtype=np.int8)
+    whole = part = shapes[slot.number]
+    for index in view.path:
+        part = part[index]
+    return whole, part
 
 
 def _dependencies(accesses: Sequence[Sequence[Access]]) -> tuple[list[list[int]], list[int]]:

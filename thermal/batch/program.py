@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal.batch.compiled import Placed, compile_loops, compiles
-from thermal.batch.loops import Loop, in_loops, kept_within
+from thermal.batch.loops import Loop, in_loops, kept_within, taken_apart
 from thermal.batch.machine import interprets, machine_runs, places_of
 from thermal.batch.trace import Instruction, Slot, Tape, Traced, View
 from thermal.errors import ModelError
@@ -48,7 +48,9 @@ class Program:
         self._numbers, within = compiled or alone, set[int]()
         notes = _needed(tape)
         if compiled:
-            loops = in_loops(notes, members, partial(compiles, dtype=self.dtype))
+            fits = partial(compiles, dtype=self.dtype)
+            notes = taken_apart(notes, members, fits)
+            loops = in_loops(notes, members, fits)
             within = kept_within(loops, tape.kept)
         else:
             loops = _runs(notes, interprets if alone else lambda note: False)
