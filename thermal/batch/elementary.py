@@ -35,14 +35,15 @@ def elementary() -> Mapping[str, Callable[..., Any]]:
     """
     import numba
     from llvmlite import ir
-    from numba.extending import intrinsic
+    from numba import extending
+
+    intrinsic: Any = extending.intrinsic
 
     number, whole, real = np.float32, ir.IntType(32), ir.FloatType()
     single = numba.types.float32
-    inline: Any = numba.njit(error_model="numpy")
     half_root = 0x3F3504F3  # bits of the root of a half, from which the fraction of a number is counted
 
-    @intrinsic  # type: ignore[misc]
+    @intrinsic
     def two_to(_: Any, power: Any) -> Any:
         def code(context: Any, builder: Any, signature: Any, given: Any) -> Any:
             biased = builder.add(builder.fptosi(given[0], whole), whole(127))
@@ -50,7 +51,7 @@ def elementary() -> Mapping[str, Callable[..., Any]]:
 
         return single(single), code
 
-    @intrinsic  # type: ignore[misc]
+    @intrinsic
     def binary_exponent(_: Any, value: Any) -> Any:
         def code(context: Any, builder: Any, signature: Any, given: Any) -> Any:
             counted = builder.sub(builder.bitcast(given[0], whole), whole(half_root))
@@ -58,7 +59,7 @@ def elementary() -> Mapping[str, Callable[..., Any]]:
 
         return single(single), code
 
-    @intrinsic  # type: ignore[misc]
+    @intrinsic
     def fraction(_: Any, value: Any) -> Any:
         def code(context: Any, builder: Any, signature: Any, given: Any) -> Any:
             counted = builder.sub(builder.bitcast(given[0], whole), whole(half_root))
@@ -72,7 +73,8 @@ def elementary() -> Mapping[str, Callable[..., Any]]:
     log2_e, ln_2 = number(1.4426950408889634), number(0.6931471805599453)
     ln_2_first, ln_2_rest = number(0.693359375), number(-2.12194440e-4)
     e5, e4, e3, e2, e1, e0 = (number(v) for v in (
-        1.9875691500e-4, 1.3981999507e-3, 8.3334519073e-3, 4.1665795894e-2, 1.6666665459e-1, 5.0000001201e-1))  # fmt: skip
+        1.9875691500e-4, 1.3981999507e-3, 8.3334519073e-3, 4.1665795894e-2, 1.6666665459e-1,
+        5.0000001201e-1))  # fmt: skip
     l8, l7, l6, l5, l4, l3, l2, l1, l0 = (number(v) for v in (
         7.0376836292e-2, -1.1514610310e-1, 1.1676998740e-1, -1.2420140846e-1, 1.4249322787e-1, -1.6668057665e-1,
         2.0000714765e-1, -2.4999993993e-1, 3.3333331174e-1))  # fmt: skip
@@ -81,30 +83,30 @@ def elementary() -> Mapping[str, Callable[..., Any]]:
     right, diagonal = number(np.pi / 2.0), number(np.pi / 4.0)
     lowest, highest, largest = number(-88.0), number(89.0), number(254.0)
 
-    @inline  # type: ignore[misc]
+    @numba.njit(error_model="numpy")
     def rise(r: Any) -> Any:
         """e^r - 1 of a small number."""
         p = ((((e5 * r + e4) * r + e3) * r + e2) * r + e1) * r + e0
         return p * (r * r) + r
 
-    @inline  # type: ignore[misc]
+    @numba.njit(error_model="numpy")
     def reduced(x: Any) -> Any:
         n = np.rint(x * log2_e)
         return n, (x - n * ln_2_first) - n * ln_2_rest
 
-    @inline  # type: ignore[misc]
+    @numba.njit(error_model="numpy")
     def between(x: Any, low: Any, high: Any) -> Any:
         y = x if x < high else high
         return y if y > low else low
 
-    @inline  # type: ignore[misc]
+    @numba.njit(error_model="numpy")
     def exp(x: Any) -> Any:
         n, r = reduced(between(x, lowest, highest))
         h = np.rint(n * half)  # in two steps, as 2^n alone may be too large
         y = (rise(r) + one) * two_to(h) * two_to(n - h)
         return y if x == x else x
 
-    @inline  # type: ignore[misc]
+    @numba.njit(error_model="numpy")
     def expm1(x: Any) -> Any:
         n, r = reduced(between(x, lowest, highest))
         h = np.rint(n * half)
@@ -112,14 +114,14 @@ def elementary() -> Mapping[str, Callable[..., Any]]:
         y = (rise(r) * s + (s - two_to(h - n))) * two_to(n - h)
         return y if x == x else x
 
-    @inline  # type: ignore[misc]
+    @numba.njit(error_model="numpy")
     def log_of_fraction(m: Any) -> Any:
         x = m - one
         z = x * x
         y = (((((((l8 * x + l7) * x + l6) * x + l5) * x + l4) * x + l3) * x + l2) * x + l1) * x + l0
         return x, x * z * y - half * z
 
-    @inline  # type: ignore[misc]
+    @numba.njit(error_model="numpy")
     def log(x: Any) -> Any:
         n = binary_exponent(x)
         a, b = log_of_fraction(fraction(x))
@@ -128,7 +130,7 @@ def elementary() -> Mapping[str, Callable[..., Any]]:
         y = -infinity if x == zero else y
         return x if x == infinity else y
 
-    @inline  # type: ignore[misc]
+    @numba.njit(error_model="numpy")
     def power(x: Any, first: Any, rest: Any, at_zero: Any, at_infinity: Any) -> Any:
         n = binary_exponent(x)
         a, b = log_of_fraction(fraction(x))
@@ -142,7 +144,7 @@ def elementary() -> Mapping[str, Callable[..., Any]]:
         y = at_zero if x == zero else y
         return at_infinity if x == infinity else y
 
-    @inline  # type: ignore[misc]
+    @numba.njit(error_model="numpy")
     def arctan(x: Any) -> Any:
         a = abs(x)
         above = a - one if a > flat else a

@@ -102,7 +102,7 @@ def in_loops(notes: Sequence[Instruction], members: int, fits: Callable[[Instruc
     loops, left = list[Loop](), len(notes)
     while left:
         arithmetic = [key for key, rows in ready.items() if key is not None and rows]
-        chosen = min(arithmetic, key=lambda key: (key[1], len(key[0]), key)) if arithmetic else None  # type: ignore[index]
+        chosen = min(arithmetic, key=lambda key: (key[1], len(key[0]), key)) if arithmetic else None
         taken = _fill(chosen, ready, axes, accesses, followers, waits)
         loops.append(Loop(chosen, [notes[k] for k in taken]))
         left -= len(taken)
