@@ -143,7 +143,12 @@ class PlantStudy:
         """
         if self.model is not None:
             return tuple(found.machine for found in self.model.maps)
-        return find_machines(plant.actuators, plant.columns, plant.zone_names, self.actuators)
+        return find_machines(plant.actuators, plant.columns, plant.zone_names, self.actuators, self._capacities)
+
+    @property
+    def _capacities(self) -> dict[str, tuple[tuple[float, float], ...]]:
+        """What data sheets say, by actuator."""
+        return {name: entry.capacity for name, entry in self.description.actuators.items()}
 
     def seen_machines(self, seen: PlantTelemetry) -> tuple[Machine, ...]:
         """Actuators that are controlled, where there is telemetry: a real building has no program to ask.
@@ -157,7 +162,9 @@ class PlantStudy:
             with self.plant() as there:
                 return self.machines(there)
         columns = [str(name) for name in seen.frame if not str(name).startswith(SET)]
-        return find_machines(described_actuators(self.description), columns, tuple(self.site.areas), self.actuators)
+        return find_machines(
+            described_actuators(self.description), columns, tuple(self.site.areas), self.actuators, self._capacities
+        )
 
     def optimal(self, plant: Any) -> IdentifiedController:
         """Make optimal control.

@@ -1,6 +1,7 @@
 """What stands in a ``plant.yaml``, as a schema."""
 
 import re
+from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -105,15 +106,22 @@ class Input(Signal):
         Smallest value of a modulating actuator that is not off [library's unit].
     release : str, optional
         Input that hands the actuator over while it is 1; ``X_activate`` of ``X_u`` by default where it is there.
+    capacity : tuple of tuple of float
+        Of a setpoint: outdoor temperatures [K], rising, and the most heat of its machine at each [W], as of a data
+        sheet; on straight lines between them.
     """
 
     range: tuple[Kelvin, Kelvin] | None = None
     kind: Literal["continuous", "on_off", "modulating"] | None = None
     minimum: Number | None = None
     release: Text | None = None
+    capacity: tuple[tuple[Kelvin, Positive], ...] = ()
 
     @model_validator(mode="after")
     def _fits(self) -> "Input":
+        outdoor = [pair[0] for pair in self.capacity]
+        if any(b <= a for a, b in pairwise(outdoor)):
+            raise ValueError(f"expected a capacity over rising outdoor temperatures, found {outdoor} K")
         if (self.kind == "modulating") != (self.minimum is not None):
             raise ValueError("expected a minimum of a modulating actuator, and of no other")
         return self

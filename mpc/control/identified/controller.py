@@ -205,7 +205,8 @@ class IdentifiedController:
             self._observer.start(measurements, float(ahead.outdoor[0]))
             return
         before, levels = self._before
-        self._thermostats.learn(measurements, self._observer.zones(measurements), float(before.outdoor[0]))
+        outdoor = self._observer.outdoor(measurements, before)
+        self._thermostats.learn(measurements, self._observer.zones(measurements), outdoor)
         self._observer.update(measurements, before, levels)
         if self.conformal is not None:
             realised = self._inside(self._observer.zones(measurements) - REFERENCE, before)

@@ -30,7 +30,8 @@ class Thermostats:
     """
 
     def __init__(self, model: PlantModel) -> None:
-        self._model, self._limits = model, [HeatLimit(found.limits) for found in model.maps]
+        self._model = model
+        self._limits = [HeatLimit(found.limits, found.sheet) for found in model.maps]
         self._is_led = np.array([found.operation == "setpoint" for found in model.maps], dtype=bool)
         self._told, self._zone = np.full(len(model.maps), np.nan), np.full(len(model.box.zones), np.nan)
         self._served = [
@@ -62,7 +63,7 @@ class Thermostats:
         zone : ndarray, shape (n_zone,)
             Temperatures over the step [K].
         outdoor : float
-            Outdoor air [K].
+            Outdoor air over the step [K].
         """
         end = zone + 0.5 * np.nan_to_num(np.maximum(zone - self._zone, 0.0))
         self._zone = zone

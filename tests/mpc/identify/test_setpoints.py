@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -9,8 +11,9 @@ import pytest
 from calibration.grey_box.network import GreyBox
 from mpc.control.identified.controller import IdentifiedController, IdentifiedSettings
 from mpc.control.identified.thermostats import Thermostats
+from mpc.errors import PlantError
 from mpc.identify.limits import HeatLimit
-from mpc.identify.machines import Machine
+from mpc.identify.machines import Machine, find_machines
 from mpc.identify.maps import Curve, Loads, MachineMap, map_machines
 from mpc.identify.model import PlantModel
 from mpc.loop.actuators import HEATING_SETPOINT, Actuator
@@ -85,6 +88,24 @@ def test_a_limit_is_the_posterior_of_a_gaussian_process() -> None:
     mean, spread = 1.0 + gain * 0.5, np.sqrt(0.08 * (1.0 - gain))
     assert limit.at(np.array([280.15]))[0] == pytest.approx(mean - spread)
     assert HeatLimit().at(np.array([250.0, 290.0])).tolist() == [1.0, 1.0]
+
+
+def test_a_data_sheet_says_what_was_never_seen() -> None:
+    """A compressor that stops at -12 degC: less is relied on from a kelvin before, and readings shift the whole sheet."""
+    sheet, cold = ((253.15, 0.3), (261.0, 0.3), (261.1, 0.8), (280.0, 1.0)), np.array([256.0, 261.6, 263.0, 280.0])
+    assert HeatLimit((), sheet).at(cold) == pytest.approx([0.3, 0.3, 0.8 + 0.2 * 0.9 / 18.9, 1.0 - 0.2 / 18.9], abs=1e-9)
+    seen = HeatLimit([(280.0, 0.9), (278.0, 0.88)], sheet).at(cold)
+    assert seen[3] == pytest.approx(0.86, abs=0.03) and 0.1 < seen[0] < 0.25
+    led_by_sheet = replace(led().maps[0], machine=replace(led().maps[0].machine, capacity=((253.15, 1500.0),)))
+    assert led_by_sheet.sheet == ((253.15, pytest.approx(0.3)),)
+
+
+def test_a_data_sheet_is_of_a_setpoint_whose_heat_is_measured() -> None:
+    thermostat, sheet = Actuator(NAME, "K", 285.15, 298.15), {NAME: ((260.0, 900.0),)}
+    (found,) = find_machines([thermostat], ["room/heating_power_sensor"], ["room"], (), sheet)
+    assert found.capacity == sheet[NAME]
+    with pytest.raises(PlantError, match="capacity: expected a setpoint whose heat is measured, found no heat"):
+        find_machines([thermostat], [], ["room"], (), sheet)
 
 
 def test_limits_are_read_from_the_steps_at_which_more_was_wanted() -> None:
