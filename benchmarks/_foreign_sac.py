@@ -21,9 +21,10 @@ from stable_baselines3 import SAC
 
 from calibration.estimation.state_space import REFERENCE
 from mpc.adapters.energyplus.input import weather_path
+from mpc.control.identified.ahead import Ahead
 from mpc.control.identified.controller import IdentifiedSettings
 from mpc.control.identified.observer import GreyBoxObserver
-from mpc.control.identified.problem import SCALE, Ahead, IdentifiedProblem
+from mpc.control.identified.problem import SCALE, IdentifiedProblem
 from mpc.errors import ControlError
 from mpc.identify.model import PlantModel
 from mpc.loop.plant import Measurements

@@ -10,7 +10,8 @@ the coldest and in a typical period of its place, after a week under its own con
 - *pi*: a PI to the speed of a machine that has one;
 - *mpc*: the library's, after an experiment of two weeks beside the coldest period (``identify``, then ``control``),
   with weather forecasts that are wrong as day-ahead ones are; *mpc perfect*: the same with the weather that comes;
-- *do-mpc*: as *mpc*, every problem solved by do-mpc (extra ``[benchmarks]``), some ten minutes of CPU a run.
+- *do-mpc*: as *mpc*, every problem solved by do-mpc (extra ``[benchmarks]``), some ten minutes of CPU a run;
+- *sac*: a policy trained on the model that *mpc* has (extra ``[rl]``), of a plant whose machine is run whole.
 
 Run: ``python benchmarks/foreign_plants.py --out results/foreign_plants [--publish]`` with the extra ``[energyplus]``.
 What is finished is kept, one file a run, and the same command goes on from there. Writes ``foreign_plants.json`` and
@@ -38,17 +39,17 @@ PERIODS = ("coldest", "typical")
 TITLES = {
     "own": "own control", "rule": "full speed or set-back, lead 3 h", "long rule": "the same, lead 6 h", "pi": "PI",
     "mpc": "MPC, identified", "mpc perfect": "the same, weather known",
-    "do-mpc": "the same, solved by do-mpc",
+    "do-mpc": "the same, solved by do-mpc", "sac": "SAC, trained on the same model",
 }  # fmt: skip
 COLUMNS = ("plant", "period", "controller", "cost, EUR/m²", "against own, %", "below the band, K h a zone",
            "above, K h a zone", "time below, h a zone", "starts a day", "CPU, s")  # fmt: skip
 
 
 def wanted(name: str, controllers: list[str]) -> list[str]:
-    """List the controllers that a plant can have: a PI needs a machine with a speed."""
+    """List the controllers that a plant can have: PI and policy need a machine with a speed."""
     told = PLANTS[name].description()
     has_speed = any(entry.get("kind") == "modulating" for entry in told["actuators"].values())
-    return [each for each in controllers if each != "pi" or has_speed]
+    return [each for each in controllers if each not in ("pi", "sac") or has_speed]
 
 
 def perform(name: str, which: str, controller: str, out: Path) -> dict[str, Any]:

@@ -23,8 +23,8 @@ _MEAN, _AT = 1.0, 280.15
 _LEVEL, _SLOPE, _SHAPE, _LENGTH, _READING = 0.2, 0.02, 0.2, 5.0, 0.05
 
 #: The same of a machine with a data sheet, whose capacity is the mean: certified ones are within 8 % (Eurovent), and
-#: air flow, defrost and ducts take some more. Outdoor air that is forecast is wrong by a kelvin [K].
-_SHEET_LEVEL, _SHEET_SHAPE, _FORECAST = 0.1, 0.1, 1.0
+#: air flow, defrost and ducts take some more. A step's outdoor air is told to half a kelvin [K].
+_SHEET_LEVEL, _SHEET_SHAPE, _TOLD = 0.1, 0.1, 0.5
 
 #: Least load that is relied on [-].
 _LEAST = 0.1
@@ -44,7 +44,8 @@ class HeatLimit:
         Outdoor air [K] and load [-] of steps at the limit.
     sheet : sequence of tuple of float
         Outdoor air [K], rising, and largest load [-] of a data sheet, on straight lines between them: the mean of the
-        prior. Of the loads within a kelvin of an outdoor temperature the least is relied on, as sheets have edges.
+        prior. Sheets have edges, where a compressor stops or a resistance comes in: of the loads within the error of an
+        outdoor temperature the least is relied on, and a reading between them says nothing.
 
     Examples
     --------
@@ -74,22 +75,24 @@ class HeatLimit:
         """
         self._bins[bin_of(outdoor)] = (outdoor, load)
 
-    def at(self, outdoor: FloatArray) -> FloatArray:
+    def at(self, outdoor: FloatArray, error: FloatArray | float = 0.0) -> FloatArray:
         """Load that is relied on, shape (n,) [-].
 
         Parameters
         ----------
         outdoor : ndarray, shape (n,)
             Outdoor air [K].
+        error : ndarray, shape (n,), or float
+            Its standard deviation where it is forecast [K].
         """
-        near = outdoor + np.array([[-_FORECAST], [0.0], [_FORECAST]]) if self.sheet else outdoor[None]
-        least = self._mean(near).min(axis=0)
+        least = self._near(outdoor, error).min(axis=0)
         if not self._bins:
             return least
         at, load = np.array([*self._bins.values()]).T
         own = self._kernel(at, at) + _READING**2 * np.eye(at.size)
         cross, factor = self._kernel(outdoor, at), cho_factor(own)
-        mean = least + cross @ cho_solve(factor, load - self._mean(at))
+        near = self._near(at, _TOLD)
+        mean = least + cross @ cho_solve(factor, load - np.clip(load, near.min(axis=0), near.max(axis=0)))
         level, slope, shape = self._spreads
         prior = level**2 + (slope * (outdoor - _AT)) ** 2 + shape**2
         variance = prior - np.einsum("ij,ji->i", cross, cho_solve(factor, cross.T))
@@ -98,6 +101,10 @@ class HeatLimit:
     @property
     def _spreads(self) -> tuple[float, float, float]:
         return (_SHEET_LEVEL, 0.0, _SHEET_SHAPE) if self.sheet else (_LEVEL, _SLOPE, _SHAPE)
+
+    def _near(self, outdoor: FloatArray, error: FloatArray | float) -> FloatArray:
+        """Give the loads that are expected within the error of outdoor temperatures, shape (5, n) [-]."""
+        return self._mean(outdoor + np.linspace(-1.0, 1.0, 5)[:, None] * np.asarray(error))
 
     def _mean(self, outdoor: FloatArray) -> FloatArray:
         """Load that is expected before anything was seen [-]."""

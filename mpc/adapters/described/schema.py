@@ -218,6 +218,66 @@ class Prices(Entry):
     currency: Text = "EUR"
 
 
+class BatteryEntry(Entry):
+    """A battery that is charged and discharged.
+
+    Parameters
+    ----------
+    command : str
+        Its actuator, from -1 to 1 of its power.
+    level : str
+        The measurement that says how full it is [-].
+    capacity, power : float
+        [J], and largest electric power either way [W].
+    charging, discharging : float
+        Efficiencies [-]; by default as `thermal.components.battery.Battery`.
+    """
+
+    command: Text
+    level: Text
+    capacity: Positive
+    power: Positive
+    charging: Annotated[Number, Field(ge=0.5, le=1)] = 0.95
+    discharging: Annotated[Number, Field(ge=0.5, le=1)] = 0.95
+
+
+class ModulesEntry(Entry):
+    """Photovoltaics.
+
+    Parameters
+    ----------
+    peak : float
+        Power at 1000 W/m2 [W].
+    azimuth, tilt : float
+        Where they look, clockwise from north, and from the vertical [deg].
+    performance : float
+        Power over that of the irradiance alone [-].
+    """
+
+    peak: Positive
+    azimuth: Number = 180.0
+    tilt: Annotated[Number, Field(ge=0, le=90)] = 35.0
+    performance: Annotated[Number, Field(gt=0, le=1)] = 0.86
+
+
+class ElectricEntry(Entry):
+    """What is electric beside the machines.
+
+    Parameters
+    ----------
+    battery : BatteryEntry, optional
+        A battery.
+    photovoltaic : ModulesEntry, optional
+        Modules.
+    feed_in : float
+        Paid for what is fed into the grid [currency/kWh].
+    """
+
+    battery: BatteryEntry | None = None
+    photovoltaic: ModulesEntry | None = None
+    feed_in: Number = 0.0
+
+
 class Emissions(Entry):
     """What energy emits.
 
@@ -303,6 +363,8 @@ class PlantFile(Entry):
         What it costs.
     emissions : Emissions, optional
         What it emits; not counted by default.
+    electric : ElectricEntry, optional
+        Battery and photovoltaics, whose powers are not among those of `energy`.
     series : tuple of str
         Where named series come from, in this order: ``unit``, the tables that a unit of BOPTEST brings; a ``.csv``
         file; ``outputs``, variables of the unit from a run ahead under its own control.
@@ -332,6 +394,7 @@ class PlantFile(Entry):
     energy: Energy = Energy()
     prices: Prices | None = None
     emissions: Emissions | None = None
+    electric: ElectricEntry | None = None
     series: tuple[Text, ...] = ()
     weather: Annotated[
         Annotated[Text, Tag("<file>")] | Annotated[dict[Text, Named], Tag("<points>")],
@@ -341,3 +404,13 @@ class PlantFile(Entry):
         ),
     ] | None = None  # fmt: skip
     forecast: Outlook = Outlook()
+
+    @model_validator(mode="after")
+    def _battery_is_there(self) -> "PlantFile":
+        battery = None if self.electric is None else self.electric.battery
+        if battery is not None:
+            for name, known, what in ((battery.command, self.actuators, "an actuator"),
+                                      (battery.level, self.measurements, "a measurement")):  # fmt: skip
+                if name not in known:
+                    raise ValueError(f"expected {what} of the description as the battery's, found {name!r}")
+        return self

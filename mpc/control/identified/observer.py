@@ -7,7 +7,7 @@ import numpy as np
 from calibration.estimation.state_space import REFERENCE
 from calibration.grey_box.fit import steady_gain
 from calibration.grey_box.network import NODES
-from mpc.control.identified.problem import Ahead
+from mpc.control.identified.ahead import Ahead
 from mpc.identify.model import PlantModel
 from mpc.loop.plant import Measurements
 from thermal._types import FloatArray

@@ -16,6 +16,9 @@ _IDLE = 0.02
 #: How far past the plan a setpoint is told where all heat is wanted [K]: beyond the difference of a thermostat.
 _PUSH = 0.5
 
+#: Error of forecast outdoor air a day ahead [K], which grows with the root of the time: what weather services reach.
+_FORECAST = 2.0
+
 
 class Thermostats:
     """Tells zones' own controllers where the air shall be at the end of the step, and learns where they cannot follow.
@@ -44,11 +47,12 @@ class Thermostats:
         Parameters
         ----------
         outdoor : ndarray, shape (N,)
-            Outdoor air [K].
+            Outdoor air that is forecast for the coming steps [K].
         """
+        error = _FORECAST * np.sqrt(np.arange(len(outdoor)) * self._model.step / 86_400.0)
         return np.column_stack(
             [
-                limit.at(outdoor) if led else np.ones(len(outdoor))
+                limit.at(outdoor, error) if led else np.ones(len(outdoor))
                 for limit, led in zip(self._limits, self._is_led, strict=True)
             ]
         )
@@ -77,8 +81,11 @@ class Thermostats:
             if load > _IDLE and (missing > OUT_OF_REACH or load > self._limits[k].at(np.array([outdoor]))[0]):
                 self._limits[k].learn(outdoor, load)
 
-    def tell(self, k: int, level: float, most: float, end: FloatArray, edge: float) -> float:
+    def tell(self, k: int, level: float, most: float, zone: FloatArray, edge: float) -> float:
         """Choose a setpoint [K].
+
+        Where all heat is wanted it is the highest temperature that is planned, out of reach for now: a machine that
+        has more than was thought, or a zone that takes less, is not held back by the error.
 
         Parameters
         ----------
@@ -86,15 +93,16 @@ class Thermostats:
             Which machine.
         level, most : float
             Planned load, and the largest [-].
-        end : ndarray, shape (n_zone,)
-            Planned air at the end of the step [K].
+        zone : ndarray, shape (n, n_zone)
+            Planned air at the ends of the coming steps [K].
         edge : float
             Temperature that the zone shall not fall below [K].
         """
         idle, full = self._model.maps[k].above
-        value = float(end[self._served[k]].mean()) + idle + min(level, 1.0) * (full - idle)
+        air = zone[:, self._served[k]].mean(axis=1)
+        value = float(air[0]) + idle + min(level, 1.0) * (full - idle)
         if level > most - _IDLE:
-            value += _PUSH
+            value = max(value + _PUSH, float(air.max()))
         # a thermostat holds what it is told: told the edge it keeps the band where the model is wrong
         self._told[k] = edge if level <= _IDLE else max(value, edge)
         return float(self._told[k])
