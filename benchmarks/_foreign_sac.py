@@ -33,8 +33,7 @@ from mpc.scenario.rates import HOUR
 from mpc.studies.described import PlantStudy
 from thermal._types import FloatArray
 
-#: Environment steps of a training, a gradient step for every other one: where the return no longer rose in a trial on
-#: the training weather, some three minutes of CPU.
+#: Environment steps of a training, a gradient step for every other one: five minutes of CPU. It was not tuned.
 STEPS = 60_000
 #: Length of an episode [d].
 EPISODE = 7

@@ -85,7 +85,7 @@ class HeatLimit:
         error : ndarray, shape (n,), or float
             Its standard deviation where it is forecast [K].
         """
-        least = self._near(outdoor, error).min(axis=0)
+        least: FloatArray = self._near(outdoor, error).min(axis=0)
         if not self._bins:
             return least
         at, load = np.array([*self._bins.values()]).T

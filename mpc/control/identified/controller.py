@@ -339,17 +339,17 @@ class IdentifiedController:
             level = float(levels[k])
             if found.operation == "setpoint":
                 actuator = self._actuators[found.machine.name]
-                told = self._thermostats.tell(k, level, most[k], zone, self._edge(found, ahead))
+                told = self._thermostats.tell(k, level, most[k], zone, self._edges_of(found, ahead))
                 value = float(np.clip(told, actuator.lowest, actuator.highest))
             else:
                 value = self._command(found, level)
             values[found.machine.name] = value
         return values
 
-    def _edge(self, found: MachineMap, ahead: Ahead) -> float:
-        """Lower edge of the band of the zones of a machine, and what is kept from it [K]."""
+    def _edges_of(self, found: MachineMap, ahead: Ahead) -> tuple[float, float]:
+        """Edges of the band of the zones of a machine, the lower one with what is kept from it [K]."""
         served = [k for k, name in enumerate(self.model.box.zones) if name in found.machine.serves]
-        return float((ahead.lower[0] + self._kept[0])[served].max())
+        return float((ahead.lower[0] + self._kept[0])[served].max()), float(ahead.upper[:2, served].min())
 
     def _command(self, found: MachineMap, level: float) -> float:
         """Value of a machine's actuator for a level."""

@@ -81,7 +81,7 @@ class Thermostats:
             if load > _IDLE and (missing > OUT_OF_REACH or load > self._limits[k].at(np.array([outdoor]))[0]):
                 self._limits[k].learn(outdoor, load)
 
-    def tell(self, k: int, level: float, most: float, zone: FloatArray, edge: float) -> float:
+    def tell(self, k: int, level: float, most: float, zone: FloatArray, edges: tuple[float, float]) -> float:
         """Choose a setpoint [K].
 
         Where all heat is wanted it is the highest temperature that is planned, out of reach for now: a machine that
@@ -95,14 +95,15 @@ class Thermostats:
             Planned load, and the largest [-].
         zone : ndarray, shape (n, n_zone)
             Planned air at the ends of the coming steps [K].
-        edge : float
-            Temperature that the zone shall not fall below [K].
+        edges : tuple of float
+            Temperatures that the zone shall not fall below, and that it is never told to rise above [K].
         """
         idle, full = self._model.maps[k].above
         air = zone[:, self._served[k]].mean(axis=1)
         value = float(air[0]) + idle + min(level, 1.0) * (full - idle)
         if level > most - _IDLE:
             value = max(value + _PUSH, float(air.max()))
-        # a thermostat holds what it is told: told the edge it keeps the band where the model is wrong
-        self._told[k] = edge if level <= _IDLE else max(value, edge)
+        # a thermostat holds what it is told: within the edges it keeps the band where the model is wrong, or where the
+        # plan leaves the band for hours that it fears not to keep
+        self._told[k] = edges[0] if level <= _IDLE else max(min(value, edges[1]), edges[0])
         return float(self._told[k])

@@ -62,11 +62,15 @@ def led(limits: tuple[tuple[float, float], ...] = ()) -> PlantModel:
 def test_a_setpoint_is_the_air_that_is_planned_for_the_end_of_the_step() -> None:
     thermostats = Thermostats(led())
     end = np.array([[292.0], [292.2]])
-    assert thermostats.tell(0, 0.5, 1.0, end, 288.0) == pytest.approx(292.0 + 0.1)
-    assert thermostats.tell(0, 1.0, 1.0, end, 288.0) == pytest.approx(292.0 + 0.3 + 0.5)  # all that there is
+    assert thermostats.tell(0, 0.5, 1.0, end, (288.0, 297.0)) == pytest.approx(292.0 + 0.1)
+    assert thermostats.tell(0, 1.0, 1.0, end, (288.0, 297.0)) == pytest.approx(292.0 + 0.3 + 0.5)  # all that there is
     rising = np.array([[292.0], [294.0], [293.0]])
-    assert thermostats.tell(0, 1.0, 1.0, rising, 288.0) == 294.0  # out of reach, whatever the model has wrong
-    assert thermostats.tell(0, 0.0, 1.0, end, 288.0) == 288.0 and thermostats.tell(0, 0.5, 1.0, end, 293.0) == 293.0
+    assert thermostats.tell(0, 1.0, 1.0, rising, (288.0, 297.0)) == 294.0  # out of reach, whatever the model has wrong
+    assert thermostats.tell(0, 1.0, 1.0, rising, (288.0, 293.5)) == 293.5  # but within the band
+    assert (
+        thermostats.tell(0, 0.0, 1.0, end, (288.0, 297.0)) == 288.0
+        and thermostats.tell(0, 0.5, 1.0, end, (293.0, 297.0)) == 293.0
+    )
 
 
 def test_what_a_machine_gives_at_most_is_learned_where_its_setpoint_is_out_of_reach() -> None:
@@ -77,7 +81,7 @@ def test_what_a_machine_gives_at_most_is_learned_where_its_setpoint_is_out_of_re
     before, warm = thermostats.most(cold)[0, 0], thermostats.most(mild)[0, 0]
     assert 0.3 < before < 0.9 < warm <= 1.0  # it was never seen in such cold: less is relied on
     for told, zone, seen in ((293.0, 292.9, before), (293.0, 291.0, 0.4)):  # within reach, and out of it
-        thermostats.tell(0, 1.0, 1.0, np.array([[told - 0.8]]), 288.0)
+        thermostats.tell(0, 1.0, 1.0, np.array([[told - 0.8]]), (288.0, 297.0))
         thermostats.learn(Measurements(layout, 0, [2000.0]), np.array([zone]), 260.0)
         assert thermostats.most(cold)[0, 0] == pytest.approx(seen, abs=0.06)
     assert thermostats.most(mild)[0, 0] == pytest.approx(warm, abs=0.05)
