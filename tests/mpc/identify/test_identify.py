@@ -11,8 +11,9 @@ import pandas as pd
 import pytest
 
 from mpc.baselines.plants import FullSpeed, OwnControl
+from mpc.control.identified.ahead import Ahead
 from mpc.control.identified.controller import IdentifiedController, IdentifiedSettings
-from mpc.control.identified.problem import Ahead, IdentifiedProblem
+from mpc.control.identified.problem import IdentifiedProblem
 from mpc.control.solvers.stages import StageSolver
 from mpc.errors import ControlError, PlantError
 from mpc.identify.excitation import Excitation
