@@ -84,7 +84,7 @@ class _Job:
 #: Who waits for whom: what the page itself does takes seconds, and does not wait for a report, which takes minutes.
 PAGE, REPORTS = "page", "reports"
 
-#: Reports that are made at a time, each in a process of one thread: a calibration and a diagnosis, where there are cores.
+#: Reports made at a time, each in a process of one thread: a calibration and a diagnosis, where there are cores.
 AT_ONCE = min(2, os.cpu_count() or 1)
 
 
