@@ -181,7 +181,8 @@ def beside_sentence(mae: float, yardsticks: Yardsticks, helps: str = "") -> str:
     text = f"What anyone fits in an hour misses the same runs by: {errors}."
     better = [YARDSTICKS[name] for name, error in yardsticks.made.items() if error <= mae]
     if better:
-        return f"{text} The model does not beat {listed(better)}, so it is not yet useful. What helps: {helps}{_WOULD_HELP}."
+        text += f" The model does not beat {listed(better)}, so it is not yet useful."
+        return f"{text} What helps: {helps}{_WOULD_HELP}."
     return f"{text} The model beats {'them all' if len(yardsticks.made) > 1 else 'it'}."
 
 

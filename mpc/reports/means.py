@@ -146,8 +146,9 @@ def calibration_means(result: CalibrationResult, unchanged: float) -> Means:
     useful = held_out.yardsticks is None or held_out.yardsticks.useful(mae)
     then = "Next step: buildingmpc diagnose, which looks for what the model still lacks"
     if not useful:
-        then = f"Do not base decisions on it yet: the drawing does not say all that acts on the building. {then}, such as "
-        then += "the sun, leaks or people. Where it finds nothing, give it more days with heating that varies"
+        advice = "Do not base decisions on it yet: the drawing does not say all that acts on the building. "
+        then = f"{advice}{then}, such as the sun, leaks or people. Where it finds nothing, give it more days with "
+        then += "heating that varies"
     return Means(answer, trust.strip(), f"{then}.")
 
 

@@ -13,6 +13,7 @@ from typing import Any
 import jinja2
 import pandas as pd
 from jinja2.filters import make_attrgetter
+from markupsafe import Markup, escape
 
 from mpc.reports.display import display, write_results
 from mpc.reports.figures.zoom import zoom_scripts
@@ -157,7 +158,13 @@ def _cells(
     kinds = ["unit" if title == "unit" else "text" if k in left else "n" for k, title in enumerate(titles)]
     kinds = ["name", *kinds[1:]]
     kinds = ["when" if _DATE.fullmatch(str(text)) else kind for kind, text in zip(kinds, row, strict=True)]
+    row = [_breakable(str(text)) if "name" in kind else text for kind, text in zip(kinds, row, strict=True)]
     return list(zip(kinds, row, strict=True))
+
+
+def _breakable(name: str) -> Markup:
+    """Let a long name of a point wrap between its words, not within them."""
+    return Markup(re.sub(r"([_/])(?=\w)", r"\1<wbr>", str(escape(name))))
 
 
 def kelvin(value: float) -> str:
