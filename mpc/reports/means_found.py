@@ -13,7 +13,6 @@ from mpc.reports.page import counted, kelvin, listed, percent, significant, sure
 from mpc.studies.run import Comparison
 from thermal.effects.catalogue import CATALOGUE
 
-
 #: Probability below which a guess is not worth a measurement of its own [-].
 _A_GUESS = 0.2
 
@@ -44,7 +43,8 @@ def diagnosis_means(result: Diagnosis) -> Means:
         advice = CATALOGUE[best.effect].separated_by if best.effect in CATALOGUE else ""
         then = "Measure before you change anything"
         if best.probability < _A_GUESS:
-            return Means(answer, trust, f"{then}: what heats or cools the rooms that miss most, below, without a meter.")
+            then += ": what heats or cools the rooms that miss most, below, without a meter."
+            return Means(answer, trust, then)
         return Means(answer, trust, f"{then}. Look at: {advice}." if advice else f"{then}.")
     effects = [(r.screened.effect, r.screened.zones) for r in found]
     told = listed([f"{called(e, z)}" for e, z in effects])
