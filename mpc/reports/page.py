@@ -158,13 +158,8 @@ def _cells(
     kinds = ["unit" if title == "unit" else "text" if k in left else "n" for k, title in enumerate(titles)]
     kinds = ["name", *kinds[1:]]
     kinds = ["when" if _DATE.fullmatch(str(text)) else kind for kind, text in zip(kinds, row, strict=True)]
-    row = [_breakable(str(text)) if "name" in kind else text for kind, text in zip(kinds, row, strict=True)]
-    return list(zip(kinds, row, strict=True))
-
-
-def _breakable(name: str) -> Markup:
-    """Let a long name of a point wrap between its words, not within them."""
-    return Markup(re.sub(r"([_/])(?=\w)", r"\1<wbr>", str(escape(name))))
+    broken = re.sub(r"([_/])(?=\w)", r"\1<wbr>", str(escape(row[0])))  # a long name wraps between its words
+    return list(zip(kinds, [Markup(broken), *row[1:]], strict=True))
 
 
 def kelvin(value: float) -> str:
