@@ -52,6 +52,11 @@ def test_help_has_an_example(command: str) -> None:
     assert f"Example: buildingmpc {command}" in " ".join(answer.stdout.split())
 
 
+def test_help_keeps_units_in_brackets() -> None:
+    shown = (" ".join(run(command, "--help").stdout.split()) for command in ("verify", "experiment"))
+    assert ['--power "main [kW]"' in next(shown), "Longest length [h]." in next(shown)] == [True, True]
+
+
 def test_only_what_exists_is_offered() -> None:
     answer = run("--help")
     assert answer.exit_code == 0

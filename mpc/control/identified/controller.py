@@ -99,7 +99,7 @@ class PlannedAction(dict[str, float]):
         Expected at the edges of the steps, shape (N + 1, n_zone) [K], and electricity and other carriers over them,
         shape (N, 2) [W].
     rule : RuleEstimate or None
-        What the plan and the rule cost over the horizon; None where electricity is decided too, of which no rule is known.
+        What the plan and the rule cost over the horizon; None where electricity is decided too.
     """
 
     def __init__(self, values: Mapping[str, float], stamp: pd.Timestamp, source: str, reasons: tuple[str, ...]) -> None:
