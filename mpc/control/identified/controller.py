@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from calibration.estimation.state_space import REFERENCE
+from mpc.control.identified.by_rule import RuleEstimate, estimate_rule
 from mpc.control.identified.conformal import AFTER, ConformalBackOff, Guarantee, risen
 from mpc.control.identified.observer import GreyBoxObserver
 from mpc.control.identified.problem import SCALE, Ahead, IdentifiedProblem
@@ -90,6 +91,8 @@ class PlannedAction(dict[str, float]):
     zone, power : ndarray
         Expected at the edges of the steps, shape (N + 1, n_zone) [K], and electricity and other carriers over them,
         shape (N, 2) [W].
+    rule : RuleEstimate or None
+        What the plan and the rule cost over the horizon.
     """
 
     def __init__(self, values: Mapping[str, float], stamp: pd.Timestamp, source: str, reasons: tuple[str, ...]) -> None:
@@ -99,6 +102,7 @@ class PlannedAction(dict[str, float]):
         self.solution: StageSolution | None = None
         self.zone: FloatArray = np.empty((0, 0))
         self.power: FloatArray = np.empty((0, 2))
+        self.rule: RuleEstimate | None = None
 
 
 class IdentifiedController:
@@ -184,7 +188,7 @@ class IdentifiedController:
             self._solver, self._plan = StageSolver(self._problem.stage, len(ahead.outdoor), tolerance=1e-6), None
         self._kept = self._back_off(ahead)
         self.back_offs.append(float(self._kept[0].mean()))
-        solution = self._decided(ahead)
+        solution, on = self._decided(ahead), np.array([runs.on for runs in self._runs])
         levels = solution.decisions[0] if solution is not None else self._by_rule(measurements, ahead)
         source = "optimal plan" if solution is not None else "rules"
         reasons = () if solution is not None else ("the solver found no plan",)
@@ -197,6 +201,7 @@ class IdentifiedController:
             action.solution = solution
             action.zone = solution.states[:, : len(self.model.box.zones)] + REFERENCE
             action.power = self._powers(solution, ahead)
+            action.rule = self._compared(solution, ahead, on)
         return action
 
     def _observe(self, measurements: Measurements, ahead: Ahead) -> None:
@@ -335,6 +340,13 @@ class IdentifiedController:
         if actuator.minimum is not None and value < actuator.minimum:
             return actuator.minimum if value > 0.5 * (low + actuator.minimum) else low
         return float(np.clip(value, low, high))
+
+    def _compared(self, solution: StageSolution, ahead: Ahead, on: FloatArray) -> RuleEstimate:
+        """Hold a plan against the rule on the same model."""
+        most = self._thermostats.most(ahead.outdoor)
+        free = np.zeros_like(most), np.ones_like(most)
+        data = self._problem.data(self._observer.state, ahead, self._kept, self.settings.comfort_price, free)
+        return estimate_rule(self._problem, ahead, data.parameters, (solution.states, solution.decisions), most, on)
 
     def _powers(self, solution: StageSolution, ahead: Ahead) -> FloatArray:
         """Give expected electricity and other carriers, shape (N, 2) [W]."""
