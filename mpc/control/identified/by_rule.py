@@ -9,7 +9,8 @@ import numpy as np
 from calibration.estimation.state_space import REFERENCE
 from calibration.grey_box.network import COP_AT, COP_PER
 from mpc.baselines.plants import DIFFERENCE, LEAD
-from mpc.control.identified.problem import Ahead, IdentifiedProblem
+from mpc.control.identified.ahead import Ahead
+from mpc.control.identified.problem import IdentifiedProblem
 from mpc.identify.telemetry import CARRIERS
 from mpc.scenario.rates import KILOWATT_HOUR
 from thermal._types import FloatArray
