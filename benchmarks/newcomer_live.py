@@ -71,7 +71,9 @@ def main() -> None:
 
     try:
         python = str(top / "venv" / "bin" / "python")
-        run("wheel", sys.executable, "-m", "pip", "wheel", "--no-deps", "-w", str(top / "wheel"), str(ROOT))
+        code = str(top / "code")  # a wheel is not built in the checkout, which it would leave a folder in
+        run("clone", "git", "clone", "-q", f"file://{ROOT}", code)
+        run("wheel", sys.executable, "-m", "pip", "wheel", "--no-deps", "-w", str(top / "wheel"), code)
         wheel = str(next((top / "wheel").glob("*.whl")))
         run("environment", sys.executable, "-m", "venv", str(top / "venv"))
         run("pip install buildingmpc[live]", python, "-m", "pip", "install", "-q", f"{wheel}[live]", "rusty-bacnet")

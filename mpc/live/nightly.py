@@ -14,7 +14,8 @@ from mpc.live.audit import AuditLog, code_version
 from mpc.live.clock import Clock
 from mpc.live.notify import Notifier
 from mpc.live.pace import Pace
-from mpc.live.site import NightlyEntry, Site
+from mpc.live.site import Site
+from mpc.live.site_file import NightlyEntry
 from mpc.live.state import read_state, write_state
 from mpc.reports.monitoring import event_rows, monitoring_verdict, write_monitoring
 from thermal.case.building import Building

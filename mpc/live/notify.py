@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from email.message import EmailMessage
 
-from mpc.live.site import NotifyEntry
+from mpc.live.site_file import NotifyEntry
 
 #: Longest wait for a server [s].
 _PATIENCE = 10.0

@@ -153,7 +153,7 @@ class StepSums:
         points : ndarray, shape (n_point,)
             Ids.
         sums, counts : ndarray, shape (n_point, n_slot)
-            Of `slots_of`.
+            Of `slots_of` [as the samples].
         """
         begins = day.value // 1000 - _EPOCH - self._begin + (np.arange(SLOTS) - 1) * _SLOT
         steps = begins // self._width

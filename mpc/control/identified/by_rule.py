@@ -52,13 +52,13 @@ def estimate_rule(
     ahead : Ahead
         Of the horizon.
     parameters : ndarray, shape (N, l)
-        Of `IdentifiedProblem.data`, with ends from 0 to 1.
+        Of `IdentifiedProblem.data`, with ends from 0 to 1 [as the problem has them].
     planned : tuple of ndarray, shape (N + 1, n) and (N, m)
         States [K less the reference] and levels [-] of the plan.
     most : ndarray, shape (N, m)
         Largest levels [-].
     on : ndarray of bool, shape (m,)
-        Machines that run now.
+        Machines that run now [-].
 
     Returns
     -------

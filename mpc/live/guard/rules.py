@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
-from mpc.live.site import BacnetLink, Mode, Site
+from mpc.live.site import Site
+from mpc.live.site_file import BacnetLink, Mode
 from thermal.case.points import POINT_TYPES, ZONE_TEMPERATURE
 
 

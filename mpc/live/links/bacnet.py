@@ -8,7 +8,7 @@ from typing import Any
 
 from mpc.errors import LiveError
 from mpc.live.links.link import reading
-from mpc.live.site import BacnetLink
+from mpc.live.site_file import BacnetLink
 from mpc.loop.conversion import Conversion
 from thermal.plan.guard import extra
 

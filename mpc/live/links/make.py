@@ -5,7 +5,8 @@ from __future__ import annotations
 from mpc.live.links.bacnet import BacnetConnection
 from mpc.live.links.link import Link
 from mpc.live.links.mqtt import MqttConnection
-from mpc.live.site import BacnetLink, MqttLink, Site
+from mpc.live.site import Site
+from mpc.live.site_file import BacnetLink, MqttLink
 
 
 def make_links(site: Site) -> dict[str, Link]:

@@ -13,7 +13,7 @@ from typing import Any
 
 from mpc.errors import LiveError
 from mpc.live.links.link import reading
-from mpc.live.site import MqttLink
+from mpc.live.site_file import MqttLink
 from mpc.loop.conversion import Conversion
 from thermal.plan.guard import extra
 

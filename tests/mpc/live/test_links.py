@@ -16,7 +16,7 @@ import pytest
 
 from mpc.live.links.bacnet import BacnetConnection
 from mpc.live.links.mqtt import MqttConnection, parse_payload
-from mpc.live.site import BacnetLink, MqttLink
+from mpc.live.site_file import BacnetLink, MqttLink
 from mpc.loop.conversion import conversion
 
 CELSIUS = conversion("zone_air_temperature_sensor", "x", "degC")

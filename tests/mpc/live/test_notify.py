@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler
 
 from mpc.live.notify import Notifier
-from mpc.live.site import NotifyEntry
+from mpc.live.site_file import NotifyEntry
 
 
 class Web(BaseHTTPRequestHandler):

@@ -25,7 +25,8 @@ from mpc.live.outlook import Outlook
 from mpc.live.page.access import Access
 from mpc.live.picture import DayCost, picture
 from mpc.live.planner import Planner, forecast_of_dict, forecast_to_dict, needed_columns
-from mpc.live.site import NotifyEntry, Site
+from mpc.live.site import Site
+from mpc.live.site_file import NotifyEntry
 from thermal.units import to_si
 
 SET = "north/zone_air_heating_temperature_setpoint"
