@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
+import pandas as pd
 
 from mpc.errors import ControlError
 from mpc.scenario.forecast import Forecast
@@ -75,7 +76,7 @@ class Photovoltaic:
         ControlError.unless(
             suffices(table), "photovoltaic", "a forecast of beam and diffuse or global irradiance", "none"
         )
-        beam, diffuse = sun_of(location, table.index, step, table).plane(self.azimuth, self.tilt)
+        beam, diffuse = sun_of(location, pd.DatetimeIndex(table.index), step, table).plane(self.azimuth, self.tilt)
         return np.asarray(self.peak * self.performance * np.nan_to_num(beam + diffuse) / _STANDARD)
 
 
@@ -235,7 +236,7 @@ class ElectricStage:
         Parameters
         ----------
         decisions : ndarray, shape (n_decision,)
-            Added to the machines'.
+            Added to the machines' [-].
         """
         told = dict(zip(self.decision, decisions, strict=True))
         return float(np.clip(told["charge"] - told["discharge"], -1.0, 1.0))
