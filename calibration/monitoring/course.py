@@ -17,9 +17,9 @@ from calibration.progress import Progress
 from thermal._types import BoolArray, FloatArray
 
 #: Logarithm of the evidence from which there is an alarm [-]. Were days as the filter says, the mean time between false
-#: alarms would be exp(14) days or more; days of a model that lacks physics are not, and 14 was chosen on the
+#: alarms would be exp(12) days or more; days of a model that lacks physics are not, and 12 was chosen on the
 #: development years of ``benchmarks/monitoring.py``, so that quiet ones have less than one alarm a year.
-THRESHOLD = 14.0
+THRESHOLD = 12.0
 
 #: Days after an alarm by which a change is named [d]: evidence that is enough for an alarm is not always for a name.
 NAMING_DAYS = 7

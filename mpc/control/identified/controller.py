@@ -12,6 +12,7 @@ import pandas as pd
 
 from calibration.estimation.state_space import REFERENCE
 from mpc.control.identified.ahead import Ahead
+from mpc.control.identified.by_rule import RuleEstimate, estimate_rule
 from mpc.control.identified.conformal import AFTER, ConformalBackOff, Guarantee, risen
 from mpc.control.identified.electric import Electric, ElectricNow
 from mpc.control.identified.meter import ElectricMeter
@@ -97,6 +98,8 @@ class PlannedAction(dict[str, float]):
     zone, power : ndarray
         Expected at the edges of the steps, shape (N + 1, n_zone) [K], and electricity and other carriers over them,
         shape (N, 2) [W].
+    rule : RuleEstimate or None
+        What the plan and the rule cost over the horizon; None where electricity is decided too.
     """
 
     def __init__(self, values: Mapping[str, float], stamp: pd.Timestamp, source: str, reasons: tuple[str, ...]) -> None:
@@ -106,6 +109,7 @@ class PlannedAction(dict[str, float]):
         self.solution: StageSolution | None = None
         self.zone: FloatArray = np.empty((0, 0))
         self.power: FloatArray = np.empty((0, 2))
+        self.rule: RuleEstimate | None = None
 
 
 class IdentifiedController:
@@ -201,7 +205,7 @@ class IdentifiedController:
         if self._meter is not None:
             self._now = self._meter.read(measurements, forecast, self._location)
         self.back_offs.append(float(self._kept[0].mean()))
-        solution = self._decided(ahead)
+        solution, on = self._decided(ahead), np.array([runs.on for runs in self._runs])
         whole = None if solution is None else solution.decisions[0]
         levels = self._by_rule(measurements, ahead) if whole is None else whole[: len(self.model.maps)]
         source = "optimal plan" if solution is not None else "rules"
@@ -220,6 +224,7 @@ class IdentifiedController:
             action.solution = solution
             action.zone = solution.states[:, : len(self.model.box.zones)] + REFERENCE
             action.power = self._powers(solution, ahead)
+            action.rule = self._compared(solution, ahead, on) if self._meter is None else None
         return action
 
     def _observe(self, measurements: Measurements, ahead: Ahead) -> None:
@@ -361,6 +366,13 @@ class IdentifiedController:
         if actuator.minimum is not None and value < actuator.minimum:
             return actuator.minimum if value > 0.5 * (low + actuator.minimum) else low
         return float(np.clip(value, low, high))
+
+    def _compared(self, solution: StageSolution, ahead: Ahead, on: FloatArray) -> RuleEstimate:
+        """Hold a plan against the rule on the same model."""
+        most = self._thermostats.most(ahead.outdoor)
+        free = np.zeros_like(most), np.ones_like(most)
+        data = self._problem.data(self._observer.state, ahead, self._kept, self.settings.comfort_price, free)
+        return estimate_rule(self._problem, ahead, data.parameters, (solution.states, solution.decisions), most, on)
 
     def _powers(self, solution: StageSolution, ahead: Ahead) -> FloatArray:
         """Give expected electricity and other carriers, shape (N, 2) [W]."""

@@ -161,7 +161,7 @@ def test_days_without_telemetry_are_passed_over() -> None:
 
 def test_an_alarm_is_named_where_the_telemetry_ends_without_a_run() -> None:
     """Telemetry that is cut off in the small hours, or in a gap, leaves no run on its last days."""
-    whole, cut = (made(7, 82, 2.5, start=70) for _ in range(2))
+    whole, cut = (made(7, 81, 2.5, start=70) for _ in range(2))
     cut.errors[-1] = np.nan
     expected, event = follow(whole, REFERENCE).events[0], follow(cut, REFERENCE).events[0]
     assert len(whole) - NAMING_DAYS < event.alarm < len(whole) - 1  # it waits for its name when the telemetry ends
