@@ -132,7 +132,7 @@ def find_machines(
     wanted : sequence of str
         Names of actuators in the place of that choice.
     capacities : mapping of str to tuple, optional
-        By actuator, what a data sheet says of it, see `Machine`.
+        By actuator, what a data sheet says: outdoor air [K] and heat [W], see `Machine`.
 
     Raises
     ------

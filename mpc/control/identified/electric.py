@@ -236,7 +236,7 @@ class ElectricStage:
         Parameters
         ----------
         decisions : ndarray, shape (n_decision,)
-            Added to the machines'.
+            Added to the machines' [-].
         """
         told = dict(zip(self.decision, decisions, strict=True))
         return float(np.clip(told["charge"] - told["discharge"], -1.0, 1.0))

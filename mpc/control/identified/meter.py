@@ -69,7 +69,7 @@ class ElectricMeter:
         levels : ndarray, shape (n_machine,)
             Duties and loads of the machines [-].
         values : mapping of str to float
-            Of the actuators.
+            Of the actuators [unit of each].
         ahead : Ahead
             Whose first row is the step.
         state : ndarray

@@ -72,7 +72,7 @@ class IdentifiedProblem:
         Parameters
         ----------
         decisions : ndarray, shape (n_decision,)
-            Of a step.
+            Of a step [-].
         """
         added = self._added
         if added is None or added.electric.battery is None:

@@ -20,11 +20,14 @@ from mpc.adapters.described.schema import Period, PlantFile
 from mpc.adapters.described.series import NamedSeries, read_table, unit_period
 from mpc.adapters.fmu.plant import FmuSignals
 from mpc.errors import MpcError, PlantActionError, PlantError
+from mpc.identify.telemetry import PlantTelemetry
 from mpc.kpi.kpis import measure_kpis
 from mpc.loop.plant import Measurements
 from mpc.loop.run import run_closed_loop
 from mpc.scenario.forecast import Forecast
 from mpc.scenario.grid import StepGrid
+from mpc.studies.described import PlantStudy
+from mpc.studies.electric import electric_of
 
 pytest.importorskip("fmpy", reason="needs the extra [fmu]")
 GUIDE = Path(__file__).parents[4] / "docs" / "plant.md"
@@ -184,6 +187,24 @@ def test_ready_descriptions_fit_the_schema() -> None:
         FmuSignals(**_mappings(described))  # refuses points that the case format lacks
         assert all(entry.signal.endswith("_u") for entry in described.actuators.values())
         assert all(signal.endswith("_y") for signals in described.energy.model_dump().values() for signal in signals)
+
+
+def test_the_battery_of_the_guide_is_no_machine(folder: Path) -> None:
+    told = yaml.safe_load(blocks("yaml")[0]) | yaml.safe_load(blocks("yaml")[1])
+    with pytest.raises(ValueError, match="expected an actuator of the description as the battery's, found 'battery/batt"):
+        PlantFile.model_validate(told)
+    told["actuators"]["battery/battery_command"] = {"signal": "oveBat_u", "range": [-1, 1]}
+    told["measurements"]["battery/charge_level_sensor"] = {"signal": "reaSoc_y", "unit": "1"}
+    told["plant"], told["prices"]["demand"] = {"kind": "site"}, 4.0
+    told["actuators"][SPEED]["range"] = [0, 1]
+    told["actuators"]["living/zone_air_heating_temperature_setpoint"]["range"] = [290.0, 299.0]
+    file = PlantFile.model_validate(told)
+    electric = electric_of(file)
+    assert (electric.battery.capacity, electric.photovoltaic.tilt, electric.feed_in, electric.demand) == (36e6, 35.0, 0.08, 4.0)
+    (folder / "plant.yaml").write_text(yaml.safe_dump(told))
+    frame = pd.DataFrame(columns=["floor/heating_power_sensor"], dtype=float)
+    study = PlantStudy(folder / "plant.yaml")
+    assert [m.name for m in study.seen_machines(PlantTelemetry(frame, 900.0, study.site))] == [SPEED]
 
 
 HOUSE: dict[str, Any] = {"temperature": "reaTZon_y", "floor_area": 120.0}
