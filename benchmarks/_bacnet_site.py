@@ -20,7 +20,7 @@ CAPACITY, LOSS, HEATER, GAIN = 6e6, 90.0, 4000.0, 3000.0
 OWN, OUTDOOR = 20.0, 2.0
 
 #: Time between two looks at the device's priority arrays [s]: what is there for as long is seen.
-LOOK = 0.01
+LOOK = 0.02
 
 _BACNET_IP, _CONFIRMED, _WRITE_PROPERTY, _WRITE_MULTIPLE = 0x81, 0x00, 15, 16
 

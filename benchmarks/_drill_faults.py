@@ -188,7 +188,7 @@ def _no_disk(stack: Stack, rng: random.Random) -> Seconds:
 
 
 def _new_guard(stack: Stack, rng: random.Random) -> Seconds:
-    stack.processes["guard"].wait(20.0)
+    stack.processes["guard"].ended(20.0)
     return _start("guard")(stack, rng)
 
 

@@ -1,10 +1,18 @@
-"""A part of a site in a drill: as in operation, but for a controller that fails on inputs of one's choice."""
+"""Parts of a site in drills: as in operation, but for a controller that fails on inputs of one's choice.
+
+This program has their modules loaded and forks itself for each part that is to start, since loading takes longer than a
+drill. A part is a process with a session, sockets and memory of its own, whatever becomes of the others.
+"""
 
 from __future__ import annotations
 
+import json
 import math
+import os
 import random
+import signal
 import sys
+import traceback
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -40,9 +48,9 @@ class DrillController:
         return dict.fromkeys(chosen, math.nan) if outdoor > NO_NUMBER else chosen
 
 
-def main() -> int:
-    """Run a part."""
-    part, site = sys.argv[1], Site(Path(sys.argv[2]))
+def run_part(part: str, path: Path) -> int:
+    """Run a part until it is ended; return the exit code."""
+    site = Site(path)
     if part == "guard":
         return run_guard(site)
     if part == "collector":
@@ -50,5 +58,41 @@ def main() -> int:
     return ControlProcess(site, controller=DrillController()).run()
 
 
+def fork_part(part: str, path: Path, output: Path) -> int:
+    """Fork a part whose output goes to a file; return its process' number."""
+    child = os.fork()
+    if child:
+        return child
+    code = 1
+    try:
+        os.setsid()
+        signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+        nothing, told = os.open(os.devnull, os.O_RDONLY), os.open(output, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+        for old, new in ((nothing, 0), (told, 1), (told, 2)):
+            os.dup2(old, new)
+        code = run_part(part, path)
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        sys.stderr.flush()
+        os._exit(code)
+
+
+def _reap(*_: object) -> None:
+    try:
+        while os.waitpid(-1, os.WNOHANG)[0]:
+            pass
+    except ChildProcessError:
+        return
+
+
+def main() -> None:
+    """Fork what each line of the input names, and answer with its number."""
+    signal.signal(signal.SIGCHLD, _reap)
+    for line in sys.stdin:
+        part, path, output = json.loads(line)
+        print(fork_part(part, Path(path), Path(output)), flush=True)
+
+
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

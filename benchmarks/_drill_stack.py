@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import resource
+import select
 import shutil
 import signal
 import subprocess
@@ -75,6 +77,28 @@ def site_text(address: str, device: str) -> str:
     return "\n".join(lines) + "\n"
 
 
+class Part:
+    """A process that another program has forked.
+
+    Parameters
+    ----------
+    pid : int
+        Its number.
+    """
+
+    def __init__(self, pid: int) -> None:
+        self.pid, self._handle = pid, os.pidfd_open(pid)
+
+    def ended(self, patience: float = 0.0) -> bool:
+        """Tell whether it has ended, at the latest after a wait [s]."""
+        return bool(select.select([self._handle], [], [], patience)[0])
+
+    def send(self, number: int) -> None:
+        """Send a signal, unless it has ended."""
+        with contextlib.suppress(ProcessLookupError):
+            signal.pidfd_send_signal(self._handle, number)
+
+
 class Stack:
     """The site in a folder.
 
@@ -87,6 +111,8 @@ class Stack:
     """
 
     def __init__(self, folder: Path, seed: int = 0) -> None:
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        self._used = before.ru_utime + before.ru_stime
         folder.mkdir(parents=True, exist_ok=True)
         self.folder, data = folder, folder / "pg"
         data.mkdir()
@@ -106,29 +132,30 @@ class Stack:
         self.site = Site(self.site_path)
         set_clock(self.site.folder / "clock.json", BEGIN.timestamp())
         self.clock = self.site.clock()
-        self.processes: dict[str, subprocess.Popen[bytes]] = {}
-        self.cpu: dict[str, float] = {}
+        root = str(Path(__file__).parents[1])
+        self._forks = subprocess.Popen(
+            [sys.executable, str(Path(__file__).with_name("_drill_process.py"))], stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE, text=True, cwd=folder,
+            env=os.environ | {"PYTHONPATH": root + os.pathsep + os.environ.get("PYTHONPATH", "")},
+        )  # fmt: skip
+        self.processes: dict[str, Part] = {}
+        self.cpu = 0.0
         self._events: dict[str, list[dict[str, Any]]] = {}
         self._seen: dict[Path, int] = {}
 
     def start(self, *parts: str) -> None:
         """Start parts."""
-        script = Path(__file__).with_name("_drill_process.py")
-        root = str(Path(__file__).parents[1])
-        environment = os.environ | {"PYTHONPATH": root + os.pathsep + os.environ.get("PYTHONPATH", "")}
         for part in parts:
-            with (self.folder / f"{part}.out").open("ab") as output:
-                self.processes[part] = subprocess.Popen(
-                    [sys.executable, str(script), part, str(self.site_path)], stdout=output, stderr=output,
-                    env=environment, cwd=self.folder,
-                )  # fmt: skip
+            asked = [part, str(self.site_path), str(self.folder / f"{part}.out")]
+            print(json.dumps(asked), file=self._forks.stdin, flush=True)
+            self.processes[part] = Part(int(next(self._forks.stdout or iter(()))))
 
     def signal(self, part: str, number: int) -> None:
         """Send a signal; a part that is killed is waited for."""
         process = self.processes[part]
-        process.send_signal(number)
-        if number in (signal.SIGKILL, signal.SIGTERM):
-            process.wait(20.0)
+        process.send(number)
+        if number in (signal.SIGKILL, signal.SIGTERM) and not process.ended(20.0):
+            raise TimeoutError(f"{part} did not end")
 
     def acting(self) -> bool:
         """Whether both setpoints are ours."""
@@ -159,20 +186,19 @@ class Stack:
         """End everything."""
         for part in ("controller", "guard", "collector"):
             process = self.processes.get(part)
-            if process is not None and process.poll() is None:
-                process.send_signal(signal.SIGCONT)
-                process.terminate()
-                try:
-                    process.wait(10.0)
-                except subprocess.TimeoutExpired:
-                    process.kill()
-                    process.wait()
+            if process is not None and not process.ended():
+                process.send(signal.SIGCONT)
+                process.send(signal.SIGTERM)
+                if not process.ended(10.0):
+                    process.send(signal.SIGKILL)
+                    process.ended(10.0)
+        self._forks.communicate()
         self.building.stop()
         self.database.stop()
         if self.bounded:
             subprocess.run(["umount", "-l", str(self.folder / "pg")], capture_output=True, check=False)
         used = resource.getrusage(resource.RUSAGE_CHILDREN)
-        self.cpu["parts and database"] = used.ru_utime + used.ru_stime
+        self.cpu = used.ru_utime + used.ru_stime - self._used
 
     def remove(self) -> None:
         """Take the folder away."""

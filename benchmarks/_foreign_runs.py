@@ -19,6 +19,7 @@ from foreign_models.plants import PLANTS, write_plant
 from mpc.adapters.energyplus.input import weather_path
 from mpc.baselines.plants import LEAD, FullSpeed, OwnControl
 from mpc.control.identified.controller import IdentifiedSettings
+from mpc.errors import ControlError
 from mpc.identify.excitation import ExcitationSettings
 from mpc.identify.identify import identify
 from mpc.identify.model import FILE, PlantModel, read_model
@@ -46,6 +47,7 @@ CONTROLLERS: dict[str, Callable[[PlantStudy, Any], Controller]] = {
     "mpc": lambda study, plant: study.optimal(plant),
     "mpc perfect": lambda study, plant: study.optimal(plant),
     "do-mpc": lambda study, plant: DoMpcController(study.optimal(plant), plant.forecaster.horizon),
+    "sac": lambda study, plant: _sac(study),
 }
 
 
@@ -84,7 +86,9 @@ def drive(
     perfect = controller == "mpc perfect"
     folder = out / ("plants_foreseen" if perfect else "plants")
     path = write_plant(name, folder, "none" if perfect else "day_ahead")
-    model, spent = identified(name, out) if "mpc" in controller else (None, {})
+    model, spent = identified(name, out) if "mpc" in controller or controller == "sac" else (None, {})
+    if controller == "sac" and model is not None:
+        spent = spent | trained(name, path, model)
     first, last = (f"{day:%Y-%m-%d}" for day in (begin, begin + pd.Timedelta(days=days)))
     study = PlantStudy(path, start=first, end=last, model=model, settings=settings or IdentifiedSettings())
     with study.plant() as plant:
@@ -109,6 +113,29 @@ def identified(name: str, out: Path) -> tuple[PlantModel, dict[str, Any]]:
                  "experiment_discomfort": kpis.tdis_tot}  # fmt: skip
         file.write_text(json.dumps(spent) + "\n", encoding="utf-8")
     return read_model(folder), dict(json.loads(file.read_text(encoding="utf-8")))
+
+
+def trained(name: str, path: Path, model: PlantModel) -> dict[str, float]:
+    """Train SAC on the model of a plant, or read what that took."""
+    from _foreign_sac import train
+
+    file = _policy(path)
+    took = file.with_suffix(".json")
+    if not took.exists():
+        took.write_text(json.dumps({"training_cpu_seconds": train(name, path, model, file)}) + "\n", encoding="utf-8")
+    return dict(json.loads(took.read_text(encoding="utf-8")))
+
+
+def _policy(path: Path) -> Path:
+    """File of the policy of a plant."""
+    return path.parent.parent.parent / "models" / path.parent.name / "sac.zip"
+
+
+def _sac(study: PlantStudy) -> Controller:
+    from _foreign_sac import SacController
+
+    ControlError.unless(study.model is not None, "SAC", "a model of the plant", "none")
+    return SacController(_policy(study.path), study.model, study)
 
 
 def account(loop: ClosedLoopRun, scenario: Scenario, seconds: list[float]) -> dict[str, Any]:

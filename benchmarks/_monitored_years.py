@@ -83,6 +83,8 @@ class Change:
         In the units of the kind, with its sign.
     start, end : int
         First day, and the first on which it is mended; the days of the year where it is not.
+    over : float
+        Days over which a sensor drifts to its size [d]; 0 is at once.
     """
 
     kind: str = ""
@@ -91,16 +93,19 @@ class Change:
     size: float = 0.0
     start: int = DAYS
     end: int = DAYS
+    over: float = 0.0
 
     def to_dict(self) -> dict[str, Any]:
         """Label."""
         return asdict(self)
 
 
-def draw_change(building: Building, seed: int, outside: list[str], pairs: list[tuple[str, str]]) -> Change:
+def draw_change(
+    building: Building, seed: int, outside: list[str], pairs: list[tuple[str, str]], kind: str = ""
+) -> Change:
     """Draw what changes: kinds take turns, half of them are mended after three to ten weeks."""
     rng = np.random.default_rng([seed, 11])
-    kind = list(CHANGES)[seed % len(CHANGES)]
+    kind = kind or list(CHANGES)[seed % len(CHANGES)]
     effects, zonal, (low, high) = CHANGES[kind]
     size = float(rng.uniform(low, high)) * (-1.0 if kind in ("sensor_bias", "flow_gain", "clock_shift")
                                              and rng.random() < 0.5 else 1.0)  # fmt: skip
@@ -112,15 +117,17 @@ def draw_change(building: Building, seed: int, outside: list[str], pairs: list[t
     return Change(kind, effects, zones if zonal else (), size, start, end)
 
 
-def make_year(seed: int, changed: bool) -> tuple[Case, Change]:
-    """Make a year of telemetry, and say what changed."""
+def make_year(seed: int, changed: bool, days: int = DAYS, kind: str = "", **when: float) -> tuple[Case, Change]:
+    """Make a year of telemetry, or so many days, and say what changed: what is drawn, or a kind, `when` of `Change`."""
     rng = np.random.default_rng([seed, 12])
     zones = int(rng.integers(4, 6))
     building = _drawn_building(seed, float(rng.uniform(28.0, 45.0)) * zones, zones)
-    weather = _weather(building, seed, rng)
+    weather = _weather(building, seed, rng, days)
     plant = _Plant(building, weather, seed, rng)
     outside = [z for z, exposed in zip(building.zone_names, plant.exposed, strict=True) if exposed]
-    change = draw_change(building, seed, outside, plant.pairs) if changed else Change()
+    change = draw_change(building, seed, outside, plant.pairs, kind) if changed else Change()
+    if kind:
+        change = replace(change, **{"end": DAYS} | when)
     plant.change = change
     plans = building.geometry
     if not isinstance(plans, FloorPlans):
@@ -163,15 +170,15 @@ def _drawn_building(seed: int, floor_area: float, zones: int) -> Building:
     raise AssertionError("unreachable")
 
 
-def _weather(building: Building, seed: int, rng: np.random.Generator) -> pd.DataFrame:
+def _weather(building: Building, seed: int, rng: np.random.Generator, days: int) -> pd.DataFrame:
     """Make a mild climate colder, with a wider year, by as much as is drawn."""
     begin = str((pd.Timestamp(START) - pd.Timedelta(days=RUN_IN)).date())
     weather = generate_weather(
-        seed, start=begin, days=DAYS + RUN_IN, step_seconds=STEP, location=building.location,
+        seed, start=begin, days=days + RUN_IN, step_seconds=STEP, location=building.location,
         station=building.weather_station,
     )  # fmt: skip
     index = pd.DatetimeIndex(weather.index)
-    year = np.cos(2.0 * np.pi * (index.dayofyear.to_numpy() - 15.0) / 365.25)
+    year = np.cos(2.0 * np.pi * (index.day_of_year.to_numpy() - 15.0) / 365.25)
     colder = rng.uniform(-2.0, 6.0) + rng.uniform(0.0, 7.0) * year
     weather[f"{building.weather_station}/outside_air_temperature_sensor"] -= np.round(colder, 3)
     return weather
@@ -274,7 +281,7 @@ class _Plant:
         self.state = self.space.advance(self.state) + self.space.drive @ drives
         self.number += 1
         if kind == "sensor_bias":
-            self.bias[at] = change.size
+            self.bias[at] = change.size * (min((day - change.start) / change.over, 1.0) if change.over else 1.0)
         self.zone = mean + self.bias
         return self.zone
 
@@ -322,7 +329,7 @@ def _boundary(building: Building, network: ThermalNetwork, weather: pd.DataFrame
 def _people(rng: np.random.Generator, index: pd.DatetimeIndex, zones: int) -> Array:
     """Presence: a course for each zone and day, with days off that no calendar has."""
     middle = index - pd.Timedelta(seconds=STEP / 2)
-    hour, day = np.asarray(middle.hour + middle.minute / 60.0), np.asarray(middle.dayofyear + 366 * middle.year)
+    hour, day = np.asarray(middle.hour + middle.minute / 60.0), np.asarray(middle.day_of_year + 366 * middle.year)
     present = np.zeros((len(index), zones))
     for number in np.unique(day):
         rows = np.flatnonzero(day == number)

@@ -120,6 +120,7 @@ def main(arguments: list[str] | None = None) -> dict[str, dict[str, float]]:
     parser.add_argument("--members", type=int, default=MEMBERS, help="environments at once")
     parser.add_argument("--zones", type=int, nargs="*", default=list(OFFICES), choices=list(OFFICES), help="offices")
     parser.add_argument("--plain", action="store_true", help="leave out what numba compiles")
+    parser.add_argument("--publish", action="store_true", help="replace the table between its marks")
     options = parser.parse_args(arguments)
     compiled = not options.plain and find_spec("numba") is not None
     found = {str(z): compare(z, options.steps, options.members, compiled) for z in options.zones}
@@ -127,7 +128,7 @@ def main(arguments: list[str] | None = None) -> dict[str, dict[str, float]]:
             for zones, rates in found.items() for name, rate in rates.items()]  # fmt: skip
     note = f"Steps of 5 minutes, one core; load average {os.getloadavg()[0]:.1f}.\n"
     text = markdown(("zones", "what", "steps a second", "µs a step"), rows) + "\n" + note
-    write(options.out, "environment_speed", text, found, False)
+    write(options.out, "environment_speed", text, found, options.publish)
     print(text)
     return found
 

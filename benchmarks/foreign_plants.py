@@ -10,11 +10,12 @@ the coldest and in a typical period of its place, after a week under its own con
 - *pi*: a PI to the speed of a machine that has one;
 - *mpc*: the library's, after an experiment of two weeks beside the coldest period (``identify``, then ``control``),
   with weather forecasts that are wrong as day-ahead ones are; *mpc perfect*: the same with the weather that comes;
-- *do-mpc*: as *mpc*, every problem solved by do-mpc (extra ``[benchmarks]``), some ten minutes of CPU a run.
+- *do-mpc*: as *mpc*, every problem solved by do-mpc (extra ``[benchmarks]``), some ten minutes of CPU a run;
+- *sac*: a policy trained on the model that *mpc* has (extra ``[rl]``), of a plant whose machine is run whole.
 
 Run: ``python benchmarks/foreign_plants.py --out results/foreign_plants [--publish]`` with the extra ``[energyplus]``.
-What is finished is kept, one file a run, and the same command goes on from there. Writes ``foreign_plants.json`` and
-``.md``; with ``--publish`` also the table in ``docs/foreign_plants.md``.
+What is finished is kept, one file a run, and the same command goes on from there; ``--finished`` lays out what there is
+so far. Writes ``foreign_plants.json`` and ``.md``; with ``--publish`` also the table in ``docs/foreign_plants.md``.
 """
 
 from __future__ import annotations
@@ -38,22 +39,27 @@ PERIODS = ("coldest", "typical")
 TITLES = {
     "own": "own control", "rule": "full speed or set-back, lead 3 h", "long rule": "the same, lead 6 h", "pi": "PI",
     "mpc": "MPC, identified", "mpc perfect": "the same, weather known",
-    "do-mpc": "the same, solved by do-mpc",
+    "do-mpc": "the same, solved by do-mpc", "sac": "SAC, trained on the same model",
 }  # fmt: skip
 COLUMNS = ("plant", "period", "controller", "cost, EUR/m²", "against own, %", "below the band, K h a zone",
            "above, K h a zone", "time below, h a zone", "starts a day", "CPU, s")  # fmt: skip
 
 
 def wanted(name: str, controllers: list[str]) -> list[str]:
-    """List the controllers that a plant can have: a PI needs a machine with a speed."""
+    """List the controllers that a plant can have: PI and policy need a machine with a speed."""
     told = PLANTS[name].description()
     has_speed = any(entry.get("kind") == "modulating" for entry in told["actuators"].values())
-    return [each for each in controllers if each != "pi" or has_speed]
+    return [each for each in controllers if each not in ("pi", "sac") or has_speed]
+
+
+def file_of(name: str, which: str, controller: str, out: Path) -> Path:
+    """File of a run."""
+    return out / name / f"{which}_{controller.replace(' ', '_')}.json"
 
 
 def perform(name: str, which: str, controller: str, out: Path) -> dict[str, Any]:
     """Do a run, or read what came of it; a failure is a result."""
-    path = out / name / f"{which}_{controller.replace(' ', '_')}.json"
+    path = file_of(name, which, controller, out)
     if path.exists():
         return dict(json.loads(path.read_text(encoding="utf-8")))
     data: dict[str, Any] = {"plant": name, "period": which, "controller": controller, "code": code()}
@@ -95,6 +101,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--plants", nargs="+", default=list(PLANTS), choices=list(PLANTS))
     parser.add_argument("--periods", nargs="+", default=list(PERIODS), choices=list(PERIODS))
     parser.add_argument("--controllers", nargs="+", default=list(CONTROLLERS), choices=list(CONTROLLERS))
+    parser.add_argument("--finished", action="store_true", help="lay out the runs that are there, without new ones")
     parser.add_argument("--publish", action="store_true", help="replace the table between its marks")
     options = parser.parse_args(arguments)
     runs = []
@@ -102,6 +109,8 @@ def main(arguments: list[str] | None = None) -> int:
         for name in options.plants:
             for which in options.periods:
                 for controller in wanted(name, options.controllers):
+                    if options.finished and not file_of(name, which, controller, options.out).exists():
+                        continue
                     runs.append(perform(name, which, controller, options.out))
                     cost = runs[-1].get("cost", math.nan)
                     print(f"{name} {which} {controller}: {cost:.3f} EUR/m2", flush=True)

@@ -98,6 +98,22 @@ def _curve(source: InputFile, name: str) -> Objects:
     return {kind: {title: dict(fields)}}
 
 
+def data_sheet() -> list[list[float | str]]:
+    """Return the most heat over outdoor air, as a maker says it [degC, W]: compressor, and resistance below -5 degC."""
+    source = read_input(building_path(SOURCE))
+    coil = next(iter(source.of_type(_HEATING).values()))
+    stops = float(coil["minimum_outdoor_dry_bulb_temperature_for_compressor_operation"])
+    curve = next(iter(_curve(source, coil["heating_capacity_function_of_temperature_curve_name"]).values()))
+    fields = next(iter(curve.values()))
+    terms = [fields[f"coefficient{name}"] for name in ("1_constant", "2_x", "3_x_2", "4_x_3")]
+    just = 0.1  # K beside an edge
+    found: list[list[float | str]] = []
+    for outdoor in (-20.0, stops - just, stops, -10.0, _LET_IN, _LET_IN + just, 0.0, 7.0, 20.0):
+        compressor = CAPACITY * sum(c * outdoor**k for k, c in enumerate(terms)) if outdoor >= stops else 0.0
+        found.append([f"{outdoor:g} degC", round(compressor + RESISTANCE * (outdoor <= _LET_IN), -2)])
+    return found
+
+
 def description() -> dict[str, Any]:
     """Return what ``plant.yaml`` says of zones, points and actuators."""
     measured, acted = thermostat_points(ZONE, "shop")
@@ -114,6 +130,6 @@ def description() -> dict[str, Any]:
             "heat_pump/heating_power_sensor": f"{UNIT}, Unitary System Total Heating Rate",
             "heat_pump/supply_air_temperature_sensor": f"{UNIT} out, System Node Temperature",
         },
-        "actuators": acted,
+        "actuators": {name: entry | {"capacity": data_sheet()} for name, entry in acted.items()},
         "energy": {"electricity": power},
     }  # fmt: skip

@@ -81,9 +81,16 @@ class BatchedBuilding:
         order = self._all.end.shape[1]
         #: States, shape (r, member), or (member, r) where each has modes of its own.
         self.state = np.zeros((order, members) if self.shared else (members, order), self._dtype)
-        self._free, self._moved = np.zeros_like(self.state), np.zeros_like(self.state)
         own = Modes(*(values[0] if self.shared else np.repeat(values[:1], members, axis=0) for values in self._all))
         self._own = Modes(*(np.ascontiguousarray(values, dtype=self._dtype) for values in own))
+        self._moved = np.zeros_like(self.state)
+        if self.shared:  # readings at a step's end, and changes of modes over it, in one product each
+            one = Modes(*(values[0] for values in self._all))
+            parts = one.output * one.end, one.output @ one.driving, np.hstack([one.heating, one.driving])
+            self._left, self._led, self._moving = (np.ascontiguousarray(part, self._dtype) for part in parts)
+            self._given = np.zeros((self._moving.shape[1], members), self._dtype)
+        else:
+            self._free = np.zeros_like(self.state)
 
     def start(self, members: IntArray, models: IntArray, states: Sequence[FloatArray]) -> None:
         """Set members to the states of their buildings.
@@ -117,33 +124,36 @@ class BatchedBuilding:
         out : ndarray, shape (n_zone, member)
             Filled [K].
         """
-        own, kept = self._own, self._free
+        own = self._own
         if self.shared:
-            np.multiply(self.state, own.end[:, None], out=kept)
-            np.add(kept, own.driving @ outside, out=kept)
-            np.matmul(own.output, kept, out=out)
-            np.add(out, own.response @ gains, out=out)
+            np.matmul(self._left, self.state, out=out)
+            np.add(out, self._led @ outside + own.response @ gains, out=out)
             return
+        kept = self._free
         np.multiply(self.state, own.end, out=kept)
         kept += _each(own.driving, outside, len(kept))
         np.add(_each(own.output, kept.T, len(kept)).T, _each(own.response, gains, len(kept)).T, out=out)
 
-    def finish(self, heat: Array, gains: Array, free: Array, out: Array) -> None:
+    def finish(self, heat: Array, gains: Array, outside: Array, free: Array, out: Array) -> None:
         """Take the step that was begun.
 
         Parameters
         ----------
         heat : ndarray, shape (n_zone, member)
             Of the plant [W].
-        gains, free : ndarray
+        gains, outside, free : ndarray
             As `begin` had and gave them [W], [K].
         out : ndarray, shape (n_zone, member)
             Readings at the end of the step, counted from the reference temperature; filled [K].
         """
         own = self._own
         if self.shared:
-            np.matmul(own.heating, heat + gains, out=self._moved)
-            np.add(self._free, self._moved, out=self.state)
+            given, count = self._given, len(heat)
+            np.add(heat, gains, out=given[:count])
+            np.copyto(given[count:], outside)
+            np.matmul(self._moving, given, out=self._moved)
+            np.multiply(self.state, own.end[:, None], out=self.state)
+            np.add(self.state, self._moved, out=self.state)
             np.matmul(own.response, heat, out=out)
         else:
             np.add(self._free, _each(own.heating, heat + gains, len(self.state)), out=self.state)

@@ -156,8 +156,8 @@ class DrawnNoise:
     def __init__(self, source: NoiseSource, members: int, dtype: Any) -> None:
         self.source, self._seeds = source, np.zeros(members, dtype=np.int64)
         self._numbers = np.full(members, -1, dtype=np.int64)
-        # as it is drawn; turning a step to columns when it is needed is cheaper than turning all that was drawn
-        self._drawn = np.zeros((members, BLOCK, source.width), dtype=dtype)
+        # a step's numbers lie together: turning them to columns when they are needed is cheaper than turning all
+        self._drawn = np.zeros((BLOCK, members, source.width), dtype=dtype)
         self._members = np.arange(members)
 
     def begin(self, member: int, seed: int) -> None:
@@ -184,11 +184,11 @@ class DrawnNoise:
         if (stale := np.flatnonzero(numbers != self._numbers)).size:
             self._draw(stale, numbers)
         if rows[0] == rows[-1] and (rows == rows[0]).all():
-            np.copyto(out, self._drawn[:, rows[0]].T)
+            np.copyto(out, self._drawn[rows[0]].T)
         else:
-            np.copyto(out, self._drawn[self._members, rows].T)
+            np.copyto(out, self._drawn[rows, self._members].T)
 
     def _draw(self, members: IntArray, numbers: IntArray) -> None:
         for member in members.tolist():
-            self._drawn[member] = self.source.block(int(numbers[member]), int(self._seeds[member]))
+            self._drawn[:, member] = self.source.block(int(numbers[member]), int(self._seeds[member]))
         self._numbers[members] = numbers[members]

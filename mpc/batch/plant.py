@@ -262,7 +262,9 @@ class BatchedPlant:
             found = f"{setpoints[k].min()} to {setpoints[k].max()}"
             raise PlantActionError(f"action {self.actions[k]}", f"numbers from {ends}", found)
         over = self.now >= self._lengths[self.plant_of]
-        if over.any() and not (over & ~idle if idle is not None else over).sum() == 0:
+        if idle is not None:
+            over &= ~idle
+        if over.any():
             raise PlantError("scenario", "one more step", f"none left of {over.sum()} members", "reset them")
         self._rows.fill(self.now, self._set("row"))
         if self._noise is not None:

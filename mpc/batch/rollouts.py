@@ -7,7 +7,7 @@ import numpy as np
 from mpc.batch.plant import BatchedPlant
 from mpc.control.controller.site import SitePoints
 from mpc.control.problem.horizon import HorizonData
-from mpc.control.problem.problem import KILOWATT, ControlProblem
+from mpc.control.problem.problem import ControlProblem
 from mpc.errors import ControlError
 from mpc.loop.reduced import ReducedBuilding
 from mpc.loop.simulated import SimulatedPlant
@@ -81,12 +81,11 @@ class HorizonRollouts:
         zone = np.moveaxis(history[0], -1, 0).astype(float) + REFERENCE_TEMPERATURE
         electric, fuel = history[1].astype(float).transpose(1, 2, 0)
         changes = shares @ problem.differences.T - problem.standing(data)
-        peaks = data.peaks
-        rise = [float(peaks.rate @ (peaks.peaks(row) - peaks.so_far)) / KILOWATT for row in electric]
+        prices = problem.energy_prices(data)
         return np.column_stack([
-            electric @ (data.electricity_price * problem.hours) / KILOWATT,
-            fuel @ (data.gas_price * problem.hours) / KILOWATT,
-            rise,
+            electric @ prices[0],
+            fuel @ prices[1],
+            [problem.demand_charge(data, row) for row in electric],
             problem.penalty(data, zone[:, 1:]).value.sum(axis=(1, 2)),
             problem.move_weight * (changes**2).sum(axis=1),
             np.zeros(len(shares)),

@@ -160,7 +160,7 @@ class TracedStep:
         before = [given.states[k] for k in range(len(system.states))]
         done = advance(ops, system, before, calls, conditions, actions, plant.scenario.grid.step * 1.0)
         heat = system.at_zones(ops, done.results)
-        reached = tape.call(self.building.finish, [heat, part("gains"), free], n)
+        reached = tape.call(self.building.finish, [heat, part("gains"), part("outside"), free], n)
         mean = 0.5 * (given.reading + reached) + REFERENCE_TEMPERATURE
         step = PlantStep(0, conditions, actions, done, mean, reached)  # type: ignore[arg-type]
         measured = plant.sensors.exact(ops, step, part("weather"), part("people"))

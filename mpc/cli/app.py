@@ -54,6 +54,7 @@ app = typer.Typer(
     name="buildingmpc",
     help="Model a real building, calibrate it on telemetry, and say how far its predictions are off.",
     epilog="Start with: buildingmpc demo",
+    rich_markup_mode="markdown",  # a unit in brackets is no markup
     no_args_is_help=True,
     invoke_without_command=True,
     pretty_exceptions_enable=False,

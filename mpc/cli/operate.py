@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from mpc.live.guard.socket import GuardClient
     from mpc.live.site import Site
 
-_PARTS = ("guard", "collector", "controller", "page")
+_PARTS = ("guard", "collector", "controller", "page", "nightly")
 
 #: How long the guard may read and write after its wait, before an operator is told that it does not answer [s].
 _PATIENCE = 10.0
@@ -54,12 +54,13 @@ def operate(
     if part is not None:
         LiveError.unless_known(part, _PARTS, "--part", f"one of {', '.join(_PARTS)}")
         return _run(read, part)
-    from mpc.live.supervise import Supervisor
+    from mpc.live.supervise import PARTS, Supervisor
 
     if not json:
         say(f"Operating {read.file.name}; page: http://{read.file.page.host}:{read.file.page.port}   Ctrl-C ends it")
         say(f"Logs: {read.folder}; addresses of the page for viewers and operators: {read.folder / 'page.json'}")
-    return Supervisor(site, read.folder).run()
+    parts = PARTS if read.file.nightly is None else (*PARTS, "nightly")
+    return Supervisor(site, read.folder, parts).run()
 
 
 def _run(site: Site, part: str) -> int:
@@ -75,6 +76,10 @@ def _run(site: Site, part: str) -> int:
         from mpc.live.controller import run_controller_process
 
         return run_controller_process(site)
+    if part == "nightly":
+        from mpc.live.nightly import run_nightly
+
+        return run_nightly(site)
     from mpc.live.page.serve import run_page
 
     return run_page(site)

@@ -27,6 +27,7 @@ HISTOGRAM_EDGES: Mapping[str, tuple[float, ...]] = {
 #: What the paper's agent sets: supply water, and supply air common to the air handlers.
 SUPPLY_SETPOINTS = ("supply_water_temperature_setpoint", "supply_air_temperature_setpoint")
 
+_ROWS = 8  # rows of many plants' measurements that are scaled together
 _LARGEST = 1.0 + 1e-6  # agents compute in single precision
 
 
@@ -90,7 +91,8 @@ class ObservationLayout:
             kept, features = tuple(k for k, _ in pairs), tuple(f for _, f in pairs)
         self._kept = np.array(kept, dtype=np.intp)
         cuts = np.split(self._kept, np.flatnonzero(np.diff(self._kept) != 1) + 1) if kept else []
-        self._runs = [slice(int(run[0]), int(run[-1]) + 1) for run in cuts]
+        parts = [part for run in cuts for part in np.split(run, range(_ROWS, len(run), _ROWS))]
+        self._runs = [slice(int(part[0]), int(part[-1]) + 1) for part in parts]
         self._factor, self._offset = scaling(features)
         ahead = () if outlook is None else outlook.features
         self.features: tuple[Feature, ...] = (*features, *counted, *ahead, *CLOCK_FEATURES)
@@ -127,10 +129,9 @@ class ObservationLayout:
         if ahead is not None:
             seen[counted:forecast] = ahead
         seen[forecast:] = now
-        if not np.isfinite(seen.sum()):
-            seen[~np.isfinite(seen)] = 0.0
+        if np.isnan(seen.sum()):
+            seen[np.isnan(seen)] = 0.0
         return np.minimum(np.maximum(seen, -LARGEST, out=seen), LARGEST, out=seen)
-
 
     def observe_many(self, values: Values, ahead: Values | None, now: Values) -> Observation:
         """Observe many plants at once.
@@ -140,7 +141,7 @@ class ObservationLayout:
         values : ndarray, shape (n_column, n)
             Measurements, a column a plant [library's units].
         ahead : ndarray, shape (n_ahead, n or 1), or None
-            Of the outlook [-].
+            Of the outlook, within `LARGEST` of 0 [-].
         now : ndarray, shape (6, n or 1)
             Of `clock` [-].
 
@@ -151,12 +152,15 @@ class ObservationLayout:
         """
         seen = np.empty((len(self.features), values.shape[1]), dtype=np.float32)
         measured, counted, forecast = self._ends
-        place = 0
-        for run in self._runs:  # slices, as picking rows would copy them
+        place, largest = 0, values.dtype.type(LARGEST)
+        factor, offset = (v[:, None].astype(values.dtype) for v in (self._factor, self._offset))
+        for run in self._runs:  # slices, as picking rows would copy them; few rows at a time stay in the cache
             end = place + run.stop - run.start
             scaled = seen[place:end] if values.dtype == seen.dtype else np.empty_like(values[run])
-            np.multiply(values[run], self._factor[place:end, None].astype(values.dtype), out=scaled)
-            np.add(scaled, self._offset[place:end, None].astype(values.dtype), out=seen[place:end], casting="same_kind")
+            np.multiply(values[run], factor[place:end], out=scaled)
+            np.add(scaled, offset[place:end], out=scaled)
+            np.minimum(scaled, largest, out=scaled)
+            np.maximum(scaled, -largest, out=seen[place:end], casting="same_kind")
             place = end
         begin = measured
         for at, edges in self._histograms:
@@ -164,12 +168,11 @@ class ObservationLayout:
             counts = -np.diff(np.stack([np.full(values.shape[1], at.size), *beyond, np.zeros_like(beyond[0])]), axis=0)
             seen[begin : begin + len(edges) + 1] = counts / at.size
             begin += len(edges) + 1
-        own = seen[:counted]
-        if not np.isfinite(own.sum()):
-            own[~np.isfinite(own)] = 0.0
-        np.clip(own, np.float32(-LARGEST), np.float32(LARGEST), out=own)
+        own = seen[:measured]
+        if np.isnan(own.sum()):
+            own[np.isnan(own)] = 0.0
         if ahead is not None:
-            np.clip(ahead, -LARGEST, LARGEST, out=seen[counted:forecast], casting="same_kind")
+            seen[counted:forecast] = ahead
         seen[forecast:] = now
         return seen.T
 
@@ -273,7 +276,7 @@ class ActionLayout:
         if not valid:  # NaN is in no range
             expected = f"rows of {len(self)} numbers from -1 to 1, for {', '.join(self.chosen)}"
             raise PlantActionError("action", expected, f"shape {values.shape}, {values.min()} to {values.max()}")
-        shares = np.clip(0.5 * (values.T + 1.0), 0.0, 1.0)
+        shares = np.minimum(np.maximum(0.5 * (values.T + 1.0), 0.0), 1.0)
         each = self.lowest[:, None] + (self.highest - self.lowest)[:, None] * shares
         return np.asarray(np.repeat(each, [len(names) for names, _, _ in self._groups], axis=0))
 

@@ -31,6 +31,19 @@ class BatchReward(Protocol):
         """
 
 
+def batch_reward(reward: object) -> BatchReward | None:
+    """Take a reward for many plants at once; None where it cannot be given to many, or says something else of them.
+
+    Parameters
+    ----------
+    reward : object
+        Any; a class that writes one of ``of_values`` and ``of_steps`` anew and inherits the other says two things.
+    """
+    kind = type(reward)
+    by = [next((c for c in kind.__mro__ if name in vars(c)), None) for name in ("of_values", "of_steps")]
+    return reward if isinstance(reward, BatchReward) and by[0] is by[1] else None
+
+
 class Reward(Protocol):
     """What an agent is rewarded for."""
 

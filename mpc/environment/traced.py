@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from mpc.batch.plant import BatchedPlant
-from mpc.environment.reward import BatchReward
+from mpc.environment.reward import BatchReward, batch_reward
 from mpc.errors import PlantError
 from mpc.kpi.record import PlantRecord
 from mpc.loop.simulated import SimulatedPlant
@@ -97,13 +97,10 @@ def traced(plants: Sequence[Any], reward: Any, actions: Sequence[str]) -> Traced
     actions : sequence of str
         As in `TracedPlant`.
     """
-    kind = type(reward)
-    same = [next((c for c in kind.__mro__ if name in vars(c)), None) for name in ("of_values", "of_steps")]
-    if same[0] is None or same[0] is not same[1]:  # one that was written anew without the other says something else
-        return None
-    if not all(type(plant) is SimulatedPlant for plant in plants):
+    given = batch_reward(reward)
+    if given is None or not all(type(plant) is SimulatedPlant for plant in plants):
         return None
     try:
-        return TracedPlant(plants, reward, actions)
+        return TracedPlant(plants, given, actions)
     except (PlantError, ThermalError):
         return None

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from mpc.batch.inputs import DrivingRows
 from mpc.batch.plant import BatchedPlant, checked_plants, record_of
 from mpc.environment.environment import ControlEnvironment, Course, draw_episode
-from mpc.environment.features import clock
+from mpc.environment.features import LARGEST, clock
 from mpc.environment.layout import Observation
 from mpc.environment.render import RenderedRun
-from mpc.environment.reward import BatchReward
+from mpc.environment.reward import batch_reward
 from mpc.errors import MpcError
 from mpc.kpi.kpis import measure_kpis
 from mpc.loop.simulated import SimulatedPlant
@@ -106,14 +106,15 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Observation, NDArray[np.float
         MpcError.unless(num_envs >= 1, "num_envs", "1 or more", repr(num_envs))
         modes = AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP
         MpcError.unless(autoreset_mode in modes, "autoreset_mode", "NEXT_STEP or SAME_STEP", repr(autoreset_mode))
-        expected, found = "one with of_values, for many plants at once", type(single.reward).__name__
-        MpcError.unless(isinstance(single.reward, BatchReward), "reward", expected, found, "see BatchReward")
+        given, found = batch_reward(single.reward), type(single.reward).__name__
+        if given is None:
+            expected = "one whose class has both of_values, for many plants at once, and of_steps"
+            raise MpcError("reward", expected, found, "see BatchReward")
         self.single, self.num_envs, self.render_mode = single, num_envs, single.render_mode
         self.metadata = {**single.metadata, "autoreset_mode": autoreset_mode}
         self.single_action_space, self.single_observation_space = single.action_space, single.observation_space
         self.action_space = batch_space(single.action_space, num_envs)
         self.observation_space = batch_space(single.observation_space, num_envs)
-        given: Any = single.reward
         self._reward_of_mean = bool(given.of_mean)
         #: The plants, stepped together.
         self.batch = BatchedPlant(
@@ -300,4 +301,4 @@ def seen_rows(course: Course, plant: SimulatedPlant) -> dict[str, FloatArray]:
     expected, advice = "plants with a forecaster, or block_ends=None", "pass horizon=... in PlantSettings"
     MpcError.unless(course.outlook is None or ahead is not None, "outlook", expected, "none", advice)
     rows = np.zeros((len(edges), 0)) if ahead is None else ahead[np.minimum(np.arange(len(edges)), len(ahead) - 1)]
-    return {"ahead": rows, "clock": now}
+    return {"ahead": np.clip(rows, -LARGEST, LARGEST), "clock": now}

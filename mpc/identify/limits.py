@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -22,6 +22,10 @@ OUT_OF_REACH = 0.3
 _MEAN, _AT = 1.0, 280.15
 _LEVEL, _SLOPE, _SHAPE, _LENGTH, _READING = 0.2, 0.02, 0.2, 5.0, 0.05
 
+#: The same of a machine with a data sheet, whose capacity is the mean: certified ones are within 8 % (Eurovent), and
+#: air flow, defrost and ducts take some more. A step's outdoor air is told to half a kelvin [K].
+_SHEET_LEVEL, _SHEET_SHAPE, _TOLD = 0.1, 0.1, 0.5
+
 #: Least load that is relied on [-].
 _LEAST = 0.1
 
@@ -38,6 +42,10 @@ class HeatLimit:
     ----------
     seen : iterable of tuple of float
         Outdoor air [K] and load [-] of steps at the limit.
+    sheet : sequence of tuple of float
+        Outdoor air [K], rising, and largest load [-] of a data sheet, on straight lines between them: the mean of the
+        prior. Sheets have edges, where a compressor stops or a resistance comes in: of the loads within the error of an
+        outdoor temperature the least is relied on, and a reading between them says nothing.
 
     Examples
     --------
@@ -48,6 +56,7 @@ class HeatLimit:
     """
 
     seen: Iterable[tuple[float, float]] = ()
+    sheet: Sequence[tuple[float, float]] = ()
     _bins: dict[int, tuple[float, float]] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
@@ -66,23 +75,47 @@ class HeatLimit:
         """
         self._bins[bin_of(outdoor)] = (outdoor, load)
 
-    def at(self, outdoor: FloatArray) -> FloatArray:
+    def at(self, outdoor: FloatArray, error: FloatArray | float = 0.0) -> FloatArray:
         """Load that is relied on, shape (n,) [-].
 
         Parameters
         ----------
         outdoor : ndarray, shape (n,)
             Outdoor air [K].
+        error : ndarray, shape (n,), or float
+            Its standard deviation where it is forecast [K].
         """
+        least: FloatArray = self._near(outdoor, error).min(axis=0)
         if not self._bins:
-            return np.full(len(outdoor), _MEAN)
+            return least
         at, load = np.array([*self._bins.values()]).T
-        own = _kernel(at, at) + _READING**2 * np.eye(at.size)
-        cross, factor = _kernel(outdoor, at), cho_factor(own)
-        mean = _MEAN + cross @ cho_solve(factor, load - _MEAN)
-        prior = _LEVEL**2 + (_SLOPE * (outdoor - _AT)) ** 2 + _SHAPE**2
+        own = self._kernel(at, at) + _READING**2 * np.eye(at.size)
+        cross, factor = self._kernel(outdoor, at), cho_factor(own)
+        near = self._near(at, _TOLD)
+        mean = least + cross @ cho_solve(factor, load - np.clip(load, near.min(axis=0), near.max(axis=0)))
+        level, slope, shape = self._spreads
+        prior = level**2 + (slope * (outdoor - _AT)) ** 2 + shape**2
         variance = prior - np.einsum("ij,ji->i", cross, cho_solve(factor, cross.T))
         return np.asarray(np.maximum(mean - np.sqrt(np.maximum(variance, 0.0)), _LEAST))
+
+    @property
+    def _spreads(self) -> tuple[float, float, float]:
+        return (_SHEET_LEVEL, 0.0, _SHEET_SHAPE) if self.sheet else (_LEVEL, _SLOPE, _SHAPE)
+
+    def _near(self, outdoor: FloatArray, error: FloatArray | float) -> FloatArray:
+        """Give the loads that are expected within the error of outdoor temperatures, shape (5, n) [-]."""
+        return self._mean(outdoor + np.linspace(-1.0, 1.0, 5)[:, None] * np.asarray(error))
+
+    def _mean(self, outdoor: FloatArray) -> FloatArray:
+        """Load that is expected before anything was seen [-]."""
+        if not self.sheet:
+            return np.full(outdoor.shape, _MEAN)
+        return np.asarray(np.interp(outdoor, *np.array(self.sheet).T))
+
+    def _kernel(self, a: FloatArray, b: FloatArray) -> FloatArray:
+        level, slope, shape = self._spreads
+        straight = level**2 + slope**2 * np.outer(a - _AT, b - _AT)
+        return np.asarray(straight + shape**2 * np.exp(-0.5 * ((a[:, None] - b) / _LENGTH) ** 2))
 
 
 def bin_of(outdoor: float) -> int:
@@ -94,8 +127,3 @@ def bin_of(outdoor: float) -> int:
         [K].
     """
     return round(outdoor / BIN)
-
-
-def _kernel(a: FloatArray, b: FloatArray) -> FloatArray:
-    straight = _LEVEL**2 + _SLOPE**2 * np.outer(a - _AT, b - _AT)
-    return np.asarray(straight + _SHAPE**2 * np.exp(-0.5 * ((a[:, None] - b) / _LENGTH) ** 2))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -44,6 +44,8 @@ class Machine:
         Column with its heat; empty where it is not measured.
     power : str
         Column with what it buys; empty for the plant's meters.
+    capacity : tuple of tuple of float
+        Of a setpoint whose machine has a data sheet: outdoor air [K], rising, and the most heat there [W].
     """
 
     actuator: Actuator
@@ -51,6 +53,7 @@ class Machine:
     serves: tuple[str, ...]
     heat: str = ""
     power: str = ""
+    capacity: tuple[tuple[float, float], ...] = ()
 
     @property
     def name(self) -> str:
@@ -108,7 +111,11 @@ class Machine:
 
 
 def find_machines(
-    actuators: Sequence[Actuator], columns: Sequence[str], zones: Sequence[str], wanted: Sequence[str] = ()
+    actuators: Sequence[Actuator],
+    columns: Sequence[str],
+    zones: Sequence[str],
+    wanted: Sequence[str] = (),
+    capacities: Mapping[str, tuple[tuple[float, float], ...]] | None = None,
 ) -> tuple[Machine, ...]:
     """Choose the actuators that are controlled: commands of machines, else setpoints of zones.
 
@@ -124,12 +131,15 @@ def find_machines(
         Names.
     wanted : sequence of str
         Names of actuators in the place of that choice.
+    capacities : mapping of str to tuple, optional
+        By actuator, what a data sheet says of it, see `Machine`.
 
     Raises
     ------
     PlantError
-        When there is none, or a wanted one is not there.
+        When there is none, a wanted one is not there, or a data sheet is of one that is no setpoint with measured heat.
     """
+    sheets = {name: pairs for name, pairs in (capacities or {}).items() if pairs}
     by_name = {a.name: a for a in actuators}
     for name in wanted:
         PlantError.unless_known(name, by_name, "actuators", "one of the plant")
@@ -152,7 +162,11 @@ def find_machines(
             heat or power or len(chosen) == 1, f"actuator {name}", f"a sensor {entity}/{HEATING_POWER} or {_POWERS[0]}",
             "none", "add it to `measurements`, so that machines can be told apart",
         )  # fmt: skip
-        made.append(Machine(by_name[name], role, _served(entity, zones), heat, power))
+        PlantError.unless(
+            name not in sheets or (role == "setpoint" and heat), f"actuators.{name}.capacity",
+            "a setpoint whose heat is measured", "a command" if role == "machine" else "no heat",
+        )  # fmt: skip
+        made.append(Machine(by_name[name], role, _served(entity, zones), heat, power, sheets.get(name, ())))
     return tuple(made)
 
 

@@ -134,6 +134,12 @@ class MachineMap:
         return curve.without_standing()(0.0, u, outdoor, emitter)
 
     @property
+    def sheet(self) -> tuple[tuple[float, float], ...]:
+        """Outdoor air [K] and largest load [-] of its data sheet; nothing where there is none."""
+        full = float(self.at(self.heat, 1.0, OUTDOOR, EMITTER))
+        return tuple((outdoor, heat / full) for outdoor, heat in self.machine.capacity)
+
+    @property
     def standing(self) -> float:
         """Power at any speed above zero, of all that is bought [W]."""
         return float(sum(curve.coefficients.get("standing", 0.0) for curve in self.powers.values()))

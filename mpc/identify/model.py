@@ -16,7 +16,7 @@ from mpc.identify.maps import Curve, MachineMap
 from mpc.loop.actuators import Actuator
 
 #: File of a model in its folder, and the version of its contents.
-FILE, FORMAT = "model.json", 1
+FILE, FORMAT = "model.json", 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +86,10 @@ class PlantModel:
 
 def _map_of(entry: Mapping[str, Any]) -> MachineMap:
     told = entry["machine"]
-    machine = Machine(Actuator(**told["actuator"]), told["role"], tuple(told["serves"]), told["heat"], told["power"])
+    sheet = tuple((float(outdoor), float(heat)) for outdoor, heat in told["capacity"])
+    machine = Machine(
+        Actuator(**told["actuator"]), told["role"], tuple(told["serves"]), told["heat"], told["power"], sheet
+    )
     powers = {kind: Curve(**curve) for kind, curve in entry["powers"].items()}
     limits = tuple((float(outdoor), float(load)) for outdoor, load in entry["limits"])
     return MachineMap(machine, entry["operation"], Curve(**entry["heat"]), powers, tuple(entry["above"]), limits)

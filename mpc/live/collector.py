@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
-import signal
 from typing import Any
 
 import numpy as np
@@ -20,6 +19,7 @@ from mpc.live.historian.spool import Spool
 from mpc.live.historian.store import Historian
 from mpc.live.links.link import Link
 from mpc.live.links.make import make_links
+from mpc.live.pace import Pace
 from mpc.live.site import Site
 from mpc.live.state import write_state
 from mpc.loop.conversion import SIGNAL_UNITS
@@ -51,25 +51,21 @@ class Collector:
         )  # fmt: skip
         self.log = AuditLog(site.folder, "collector", self.clock.wall())
         self.log.append("start", {"code": code_version(), "configuration": site.hash, "wall": self.clock.wall()})
-        self._stop = asyncio.Event()
+        self._pace = Pace(self.clock)
         self._trimmed = -math.inf
         self.lost = 0
 
     async def run(self) -> int:
         """Collect until it is ended; return the exit code."""
-        loop = asyncio.get_running_loop()
-        for number in (signal.SIGTERM, signal.SIGINT):
-            loop.add_signal_handler(number, self._stop.set)
+        self._pace.heed_signals()
         links = make_links(self.site)
         for link in links.values():
             await link.open()
         try:
-            while not self._stop.is_set():
+            while not self._pace.ending:
                 begin = self.clock.mono()
                 await self.collect(links)
-                wait = self.clock.real(self.site.file.collect - (self.clock.mono() - begin))
-                with contextlib.suppress(TimeoutError):
-                    await asyncio.wait_for(self._stop.wait(), max(wait, 0.0))
+                await self._pace.rest(begin, self.site.file.collect)
             return 0
         finally:
             for link in links.values():

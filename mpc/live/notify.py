@@ -53,27 +53,41 @@ class Notifier:
         kinds = {_NUMBERS.sub("#", alarm): alarm for alarm in alarms}
         fresh = [alarm for kind, alarm in kinds.items() if kind not in self._known]
         self._known = set(kinds)
-        if fresh and (self.entry.webhook or self.entry.mail):
-            threading.Thread(target=self._send, args=(fresh, wall), daemon=True).start()
+        if fresh:
+            threading.Thread(target=self.send, args=(fresh, wall), daemon=True).start()
         return fresh
 
-    def _send(self, alarms: Sequence[str], wall: float) -> None:
+    def send(self, alarms: Sequence[str], wall: float) -> None:
+        """Send alarms, and wait until it is done.
+
+        Parameters
+        ----------
+        alarms : sequence of str
+            One at least.
+        wall : float
+            Wall clock, since 1970 in UTC [s].
+        """
         time = datetime.fromtimestamp(wall, UTC).isoformat(timespec="seconds")
-        try:
-            if self.entry.webhook:
-                body = json.dumps({"site": self.site, "time": time, "alarms": list(alarms)}).encode()
-                request = urllib.request.Request(
-                    self.entry.webhook, body, {"Content-Type": "application/json"}, method="POST"
-                )
-                urllib.request.urlopen(request, timeout=_PATIENCE).close()
-            if self.entry.mail:
-                message = EmailMessage()
-                message["Subject"] = f"buildingmpc {self.site}: {alarms[0]}"[:150].replace("\n", " ")
-                message["To"] = message["From"] = self.entry.mail
-                message.set_content("\n".join([time, *alarms]))
-                host, _, port = self.entry.smtp.partition(":")
-                with smtplib.SMTP(host, int(port or 25), timeout=_PATIENCE) as server:
-                    server.send_message(message)
-            self.trouble = ""
-        except (OSError, smtplib.SMTPException, ValueError) as error:
-            self.trouble = str(error)
+        ways = [way for way, to in ((self._post, self.entry.webhook), (self._mail, self.entry.mail)) if to]
+        troubles = []
+        for way in ways:
+            try:
+                way(alarms, time)
+            except (OSError, smtplib.SMTPException, ValueError) as error:
+                troubles.append(str(error))
+        self.trouble = "; ".join(troubles)
+
+    def _post(self, alarms: Sequence[str], time: str) -> None:
+        body = json.dumps({"site": self.site, "time": time, "alarms": list(alarms)}).encode()
+        headers = {"Content-Type": "application/json"}
+        request = urllib.request.Request(str(self.entry.webhook), body, headers, method="POST")
+        urllib.request.urlopen(request, timeout=_PATIENCE).close()
+
+    def _mail(self, alarms: Sequence[str], time: str) -> None:
+        message = EmailMessage()
+        message["Subject"] = " ".join(f"buildingmpc {self.site}: {alarms[0]}".split())[:150]
+        message["To"] = message["From"] = str(self.entry.mail)
+        message.set_content("\n".join([time, *alarms]))
+        host, _, port = self.entry.smtp.partition(":")
+        with smtplib.SMTP(host, int(port or 25), timeout=_PATIENCE) as server:
+            server.send_message(message)

@@ -30,7 +30,8 @@ def picture(site: Site, plan: Mapping[str, Any], inputs: Mapping[str, Any]) -> d
     dict
         ``begin`` and ``step`` [s]; ``number`` of the plan; ``price`` [currency/kWh], ``outdoor`` [K] over the steps;
         ``zones``: of each ``lower``, ``upper`` over the steps and ``expected`` at their edges [K]; ``power`` [W] and
-        ``cost`` [currency] of the plan, None where it says nothing of them.
+        ``cost`` [currency] of the plan, and ``rule``: ``plan``, ``rule``, what both cost by the model [currency], and
+        ``saving`` [-]; None where it says nothing of them.
     """
     forecast = inputs["forecast"]
     if forecast is None:
@@ -46,15 +47,16 @@ def picture(site: Site, plan: Mapping[str, Any], inputs: Mapping[str, Any]) -> d
                "expected": None}
         for zone in site.plant.zones
     }  # fmt: skip
-    power, cost = None, None
+    power, cost, rule = None, None, None
     if ahead is not None:
         power = [round(row[0], 1) for row in ahead["power"]]
         for k, zone in enumerate(zones):
             zones[zone]["expected"] = [round(row[k], 3) for row in ahead["zone"]]
+        rule = ahead.get("rule")
         cost = sum(w * (p or 0.0) for w, p in zip(power, price, strict=False)) * ahead["step"] / _JOULES
     return {
         "number": plan["number"], "begin": inputs["begin"], "step": site.step, "price": price, "zones": zones,
-        "outdoor": of("outside_air_temperature_sensor"), "power": power, "cost": cost,
+        "outdoor": of("outside_air_temperature_sensor"), "power": power, "cost": cost, "rule": rule,
         "currency": site.plant.prices.currency if site.plant.prices is not None else "",
     }  # fmt: skip
 

@@ -124,11 +124,13 @@ def no_plan(why: str) -> dict[str, Any]:
 
 
 def _expected(action: Any) -> dict[str, Any] | None:
-    """Temperatures and powers that a plan expects, for the page."""
+    """Temperatures and powers that a plan expects, and what it and the rule cost by the model, for the page."""
     zone, power = getattr(action, "zone", None), getattr(action, "power", None)
     if zone is None or power is None or not np.isfinite(zone).all() or not np.isfinite(power).all():
         return None
-    return {"step": float(action.step), "zone": zone.tolist(), "power": power.tolist()}
+    rule = getattr(action, "rule", None)
+    told = None if rule is None else {"plan": rule.plan, "rule": rule.rule, "saving": rule.saving}
+    return {"step": float(action.step), "zone": zone.tolist(), "power": power.tolist(), "rule": told}
 
 
 def forecast_to_dict(forecast: Forecast) -> dict[str, Any]:

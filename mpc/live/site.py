@@ -213,6 +213,33 @@ class NotifyEntry(Entry):
     smtp: Text = "localhost:25"
 
 
+class NightlyEntry(Entry):
+    """The nightly evaluation of the building, by ``buildingmpc monitor``.
+
+    Parameters
+    ----------
+    building : str
+        Folder of the case, or its ``building.yaml``, relative to the site's file; points of the site bear its names.
+    begin : str
+        First day that is read, local, ``2026-01-05``.
+    reference_days : int
+        Days from then on that are taken for sound [d].
+    at : str
+        Local time of the evaluation.
+    step : float
+        Length of the steps that samples are brought to [s].
+    parameters : str, optional
+        A ``calibration.json``, relative to the site's file; else the model is fitted to the reference days.
+    """
+
+    building: Text = "case"
+    begin: Annotated[str, Field(pattern=r"^\d{4}-\d{2}-\d{2}$")] = "2026-01-01"
+    reference_days: Annotated[int, Field(ge=14, strict=True)] = 42
+    at: Annotated[str, Field(pattern=r"^([01]\d|2[0-3]):[0-5]\d$")] = "02:30"
+    step: Positive = 1800.0
+    parameters: Text | None = None
+
+
 class SiteFile(Entry):
     """A ``site.yaml``.
 
@@ -246,6 +273,8 @@ class SiteFile(Entry):
         The page.
     notify : NotifyEntry
         Alarms.
+    nightly : NightlyEntry, optional
+        Evaluation of the building by night; none by default.
     """
 
     format: Literal[1]
@@ -264,6 +293,7 @@ class SiteFile(Entry):
     guard: GuardEntry = GuardEntry()
     page: PageEntry = PageEntry()
     notify: NotifyEntry = NotifyEntry()
+    nightly: NightlyEntry | None = None
 
 
 class Site:
@@ -350,6 +380,11 @@ class Site:
             known = kind in POINT_TYPES or point in self.plant.actuators
             LiveError.unless("/" in point and known, where, expected, repr(point), advice)
             bacnet = isinstance(file.connections[entry.connection], BacnetLink)
+            topics = entry.at.split()
+            plain = len(topics) in (1, 2) and not set("+#\0") & set(entry.at)
+            LiveError.unless(
+                bacnet or plain, f"{where}.at", "a topic to read, and one to write to, without + and #", repr(entry.at)
+            )
             found = f"release {entry.release!r} on {file.connections[entry.connection].kind}"
             LiveError.unless(
                 bacnet or entry.release != "relinquish", f"{where}.release", "a value where there are no priorities",

@@ -33,7 +33,7 @@ class Supervisor:
     folder : Path
         Where each part's output goes.
     parts : sequence of str
-        Among `PARTS`.
+        Names of parts; `PARTS` by default.
     command : callable, optional
         Gives the command line of a part; that of ``buildingmpc operate`` by default.
     """

@@ -136,7 +136,7 @@ def _people_words(people: Occupancy, assigned: FloatArray, area: float) -> str:
     if not isinstance(people, ScheduledOccupancy):
         return f"{text}, {'always in' if type(people) is Occupancy else 'who come and go at random'}"
     share = np.asarray(people.presence, dtype=float)
-    present = [f"{name} up to {row.max():.0%}".replace("%", " %") for name, row in
+    present = [f"{name} up to {100 * row.max():.0f} %" for name, row in
                zip(("weekdays", "Saturdays", "Sundays"), share, strict=True) if row.max() > 0.0]  # fmt: skip
     busy = np.flatnonzero(share[0] >= 0.5)
     when = f", mostly from {busy[0]} to {busy[-1] + 1} h" if busy.size else ""

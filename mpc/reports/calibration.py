@@ -116,7 +116,7 @@ def calibration_verdict(result: CalibrationResult) -> str:
         f"Assuming that nothing changes misses by {kelvin(rest)} K"
         + ("." if rest > after else ", less than the model.")
         if held_out.yardsticks is None
-        else evaluation.beside_sentence(after, held_out.yardsticks),
+        else evaluation.beside_sentence(after, held_out.yardsticks, "a diagnosis, which seeks what the model lacks; "),
         evaluation.carried_sentence(held_out.carried).strip(),
         *_structure_sentences(result),
         *estimated_sentences(held_out.estimated),

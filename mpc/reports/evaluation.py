@@ -160,7 +160,7 @@ def structure_words(rungs: Sequence[Rung]) -> str:
 _WOULD_HELP = "more days to tune on with heat that varies, and irradiance where none is measured"
 
 
-def beside_sentence(mae: float, yardsticks: Yardsticks) -> str:
+def beside_sentence(mae: float, yardsticks: Yardsticks, helps: str = "") -> str:
     """Say how a model does beside what anyone fits in an hour.
 
     Parameters
@@ -169,6 +169,8 @@ def beside_sentence(mae: float, yardsticks: Yardsticks) -> str:
         Of the model [K].
     yardsticks : Yardsticks
         On the same runs.
+    helps : str
+        What to try first where they do better; what helps any model follows.
 
     Examples
     --------
@@ -179,7 +181,8 @@ def beside_sentence(mae: float, yardsticks: Yardsticks) -> str:
     text = f"What anyone fits in an hour misses the same runs by: {errors}."
     better = [YARDSTICKS[name] for name, error in yardsticks.made.items() if error <= mae]
     if better:
-        return f"{text} The model does not beat {listed(better)}, so it is not yet useful. What helps: {_WOULD_HELP}."
+        text += f" The model does not beat {listed(better)}, so it is not yet useful."
+        return f"{text} What helps: {helps}{_WOULD_HELP}."
     return f"{text} The model beats {'them all' if len(yardsticks.made) > 1 else 'it'}."
 
 

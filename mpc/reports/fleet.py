@@ -123,6 +123,11 @@ def _means(outcomes: Sequence[CaseOutcome], what: str) -> Means:
     if done:
         after = [float(o.held_out_mae_after or 0.0) for o in done]
         answer += f" Their errors on days they had not seen are {kelvin(min(after))} to {kelvin(max(after))} degrees C."
+    if what == "diagnose" and done:
+        named, unknown = (sum(o.verdict in kinds for o in done) for kinds in (("named", "group"), ("unexplained",)))
+        sound = len(done) - named - unknown
+        answer += f" In {named} what is missing has a name, in {unknown} it is unknown, in {sound} nothing is missing "
+        answer += "that these data can show."
     trust = "Each building's page says how far its model can be trusted, and against which simple forecasts."
     if unsure:
         trust += f" Not {listed(unsure, 'nor')}: the solver stopped early."

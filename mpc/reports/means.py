@@ -144,8 +144,12 @@ def calibration_means(result: CalibrationResult, unchanged: float) -> Means:
         return Means(answer, f"No: the solver stopped early ({result.solver.status}).",
                      "Run it again with more starts (--starts 6), or look at the data: buildingmpc check.")  # fmt: skip
     useful = held_out.yardsticks is None or held_out.yardsticks.useful(mae)
-    then = "Next step: buildingmpc diagnose, which looks for what the model still lacks." if useful else found.next
-    return Means(answer, trust.strip(), then)
+    then = "Next step: buildingmpc diagnose, which looks for what the model still lacks"
+    if not useful:
+        advice = "Do not base decisions on it yet: the drawing does not say all that acts on the building. "
+        then = f"{advice}{then}, such as the sun, leaks or people. Where it finds nothing, give it more days with "
+        then += "heating that varies"
+    return Means(answer, trust.strip(), f"{then}.")
 
 
 def simulation_means(summary: Mapping[str, float]) -> Means:

@@ -13,6 +13,9 @@ from mpc.reports.page import counted, kelvin, listed, percent, significant, sure
 from mpc.studies.run import Comparison
 from thermal.effects.catalogue import CATALOGUE
 
+#: Probability below which a guess is not worth a measurement of its own [-].
+_A_GUESS = 0.2
+
 
 def diagnosis_means(result: Diagnosis) -> Means:
     """Say what a diagnosis means.
@@ -38,8 +41,11 @@ def diagnosis_means(result: Diagnosis) -> Means:
         trust = f"The gap is real ({kelvin(result.gap)} degrees C where {kelvin(result.floor)} should be possible); "
         trust += f"its cause is not known. The best guess, {called(best.effect)}, has {sure(best.probability)}."
         advice = CATALOGUE[best.effect].separated_by if best.effect in CATALOGUE else ""
-        then = "Measure before you change anything."
-        return Means(answer, trust, f"{then} Look at: {advice}." if advice else then)
+        then = "Measure before you change anything"
+        if best.probability < _A_GUESS:
+            then += ": what heats or cools the rooms that miss most, below, without a meter."
+            return Means(answer, trust, then)
+        return Means(answer, trust, f"{then}. Look at: {advice}." if advice else f"{then}.")
     effects = [(r.screened.effect, r.screened.zones) for r in found]
     told = listed([f"{called(e, z)}" for e, z in effects])
     likely = rivals(result, effects[0][0])

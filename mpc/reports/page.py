@@ -13,6 +13,7 @@ from typing import Any
 import jinja2
 import pandas as pd
 from jinja2.filters import make_attrgetter
+from markupsafe import Markup, escape
 
 from mpc.reports.display import display, write_results
 from mpc.reports.figures.zoom import zoom_scripts
@@ -157,7 +158,8 @@ def _cells(
     kinds = ["unit" if title == "unit" else "text" if k in left else "n" for k, title in enumerate(titles)]
     kinds = ["name", *kinds[1:]]
     kinds = ["when" if _DATE.fullmatch(str(text)) else kind for kind, text in zip(kinds, row, strict=True)]
-    return list(zip(kinds, row, strict=True))
+    broken = re.sub(r"([_/])(?=\w)", r"\1<wbr>", str(escape(row[0])))  # a long name wraps between its words
+    return list(zip(kinds, [Markup(broken), *row[1:]], strict=True))
 
 
 def kelvin(value: float) -> str:

@@ -70,7 +70,7 @@ def verification_verdict(found: Verification) -> str:
     told = []
     for saving in found.savings:
         low, high = saving.share.interval(found.settings.confidence)
-        words = f"{found.settings.confidence:.0%} interval {percent(low)} to {percent(high)}"
+        words = f"{100 * found.settings.confidence:.0f} % interval {percent(low)} to {percent(high)}"
         told.append(f"{saving.design}: {percent(saving.share.value)} ({words})")
     doubts = sorted({c.name for s in found.savings for c in s.doubts})
     text = f"Energy saved, {'; '.join(told)}."
@@ -109,7 +109,8 @@ def verification_means(found: Verification) -> Means:
     last = found.savings[-1]
     low, high = last.share.interval(found.settings.confidence)
     if low > 0.0:
-        answer = f"The new control saves {percent(last.share.value)} of the energy, and {percent(low)} at the least."
+        saved, least = (f"{100 * share:.2g} %" for share in (last.share.value, low))
+        answer = f"The new control saves {saved} of the energy, and {least} at the least."
     elif high < 0.0:
         answer = f"The new control takes {percent(-last.share.value)} more energy than the building's own."
     else:
@@ -178,9 +179,9 @@ def model_rows(saving: Saving) -> list[list[str]]:
     rows = [
         ["model", f"{model.form}{': ' + ', '.join(points) if points else ''}"],
         ["days, parameters", f"{fit.days}, {fit.parameters}"],
-        ["CV(RMSE), NMBE", f"{fit.cv_rmse:.1%}, {fit.nmbe:+.2%}"],
-        ["the same on days held out", f"{fit.held_out_cv_rmse:.1%}, up to {fit.held_out_nmbe:+.1%}"],
-        ["share of the variance", f"{fit.r_squared:.0%}"],
+        ["CV(RMSE), NMBE", f"{100 * fit.cv_rmse:.1f} %, {100 * fit.nmbe:+.2f} %"],
+        ["the same on days held out", f"{100 * fit.held_out_cv_rmse:.1f} %, up to {100 * fit.held_out_nmbe:+.1f} %"],
+        ["share of the variance", f"{100 * fit.r_squared:.0f} %"],
         ["correlation of residuals from day to day", f"{fit.autocorrelation:.2f}"],
     ]
     if isinstance(saving.found, Switchback):
@@ -194,8 +195,8 @@ def model_rows(saving: Saving) -> list[list[str]]:
     else:
         rows.append(
             [
-                f"fractional savings uncertainty, {AT_CONFIDENCE:.0%}",
-                f"{min(9.99, saving.found.fractional_uncertainty(AT_CONFIDENCE)):.0%}",
+                f"fractional savings uncertainty, {100 * AT_CONFIDENCE:.0f} %",
+                f"{100 * min(9.99, saving.found.fractional_uncertainty(AT_CONFIDENCE)):.0f} %",
             ]
         )
     return [[name, text.replace("-", "−")] for name, text in rows]

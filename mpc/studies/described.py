@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -19,13 +19,16 @@ from mpc.adapters.described.schema import PlantFile
 from mpc.adapters.described.seen import seen_scenario
 from mpc.baselines.plants import FullSpeed
 from mpc.control.identified.controller import IdentifiedController, IdentifiedSettings
+from mpc.control.identified.electric import Electric, Photovoltaic
 from mpc.errors import ControlError, PlantError
 from mpc.identify.excitation import Excitation, ExcitationSettings
 from mpc.identify.machines import Machine, find_machines
 from mpc.identify.model import PlantModel
 from mpc.identify.telemetry import SET, PlantTelemetry, Site, run_recorded
+from mpc.loop.actuators import Actuator
 from mpc.loop.run import ClosedLoopRun
 from mpc.scenario.scenario import Scenario
+from thermal.components.battery import Battery
 
 #: Warm-up before an experiment or a run whose period is given by its start [d], as of BOPTEST.
 WARM_UP_DAYS = 7.0
@@ -143,7 +146,18 @@ class PlantStudy:
         """
         if self.model is not None:
             return tuple(found.machine for found in self.model.maps)
-        return find_machines(plant.actuators, plant.columns, plant.zone_names, self.actuators)
+        actuators = self._of_machines(plant.actuators)
+        return find_machines(actuators, plant.columns, plant.zone_names, self.actuators, self._capacities)
+
+    def _of_machines(self, actuators: Iterable[Actuator]) -> tuple[Actuator, ...]:
+        """Leave out the battery's, which is not identified."""
+        electric = self.electric
+        return tuple(a for a in actuators if electric is None or a.name != electric.command)
+
+    @property
+    def _capacities(self) -> dict[str, tuple[tuple[float, float], ...]]:
+        """What data sheets say, by actuator."""
+        return {name: entry.capacity for name, entry in self.description.actuators.items()}
 
     def seen_machines(self, seen: PlantTelemetry) -> tuple[Machine, ...]:
         """Actuators that are controlled, where there is telemetry: a real building has no program to ask.
@@ -157,7 +171,8 @@ class PlantStudy:
             with self.plant() as there:
                 return self.machines(there)
         columns = [str(name) for name in seen.frame if not str(name).startswith(SET)]
-        return find_machines(described_actuators(self.description), columns, tuple(self.site.areas), self.actuators)
+        actuators = self._of_machines(described_actuators(self.description))
+        return find_machines(actuators, columns, tuple(self.site.areas), self.actuators, self._capacities)
 
     def optimal(self, plant: Any) -> IdentifiedController:
         """Make optimal control.
@@ -178,7 +193,21 @@ class PlantStudy:
             abs(self.model.step - plant.control_step) < 1e-6, "mpc", f"steps of {self.model.step:g} s of its model",
             f"{plant.control_step:g} s", "identify the plant anew",
         )  # fmt: skip
-        return IdentifiedController(self.model, plant.actuators, self.site.location, self.settings)
+        return IdentifiedController(self.model, plant.actuators, self.site.location, self.settings, self.electric)
+
+    @property
+    def electric(self) -> Electric | None:
+        """Battery, photovoltaics and charges; None where electricity has a price only."""
+        entry, prices = self.description.electric, self.description.prices
+        demand = 0.0 if prices is None or prices.demand is None else prices.demand
+        if entry is None:
+            return Electric(demand=demand) if demand else None
+        modules = None if entry.photovoltaic is None else Photovoltaic(**entry.photovoltaic.model_dump())
+        told = entry.battery
+        if told is None:
+            return Electric(photovoltaic=modules, feed_in=entry.feed_in, demand=demand)
+        battery = Battery(told.capacity, told.power, told.charging, told.discharging)
+        return Electric(battery, told.command, told.level, modules, entry.feed_in, demand)
 
     def full_speed(self, plant: Any) -> FullSpeed:
         """Make the rule.

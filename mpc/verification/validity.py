@@ -71,14 +71,16 @@ def check_before_after(found: BeforeAfter, baseline: pd.DataFrame, reporting: pd
     fit = found.fitness
     held = max(fit.held_out_cv_rmse / _CV_RMSE, abs(fit.held_out_nmbe) / _NMBE)
     told = (
-        f"CV(RMSE) {fit.held_out_cv_rmse:.1%} and NMBE up to {fit.held_out_nmbe:+.1%} on days that a fit had not seen"
+        f"CV(RMSE) {100 * fit.held_out_cv_rmse:.1f} % and NMBE up to {100 * fit.held_out_nmbe:+.1f} % "
+        "on days that a fit had not seen"
     )
     return (
         Check("baseline model", None if np.isnan(held) else bool(held <= 1.0),
               "too few days to hold any out" if np.isnan(held) else told,
               "" if held <= 1.0 else "take a longer baseline, or meter what the energy depends on"),
         Check("uncertainty", uncertainty <= UNCERTAINTY_ALLOWED,
-              f"fractional savings uncertainty {min(uncertainty, 9.99):.0%} at 68 % confidence (ASHRAE Guideline 14)",
+              f"fractional savings uncertainty {100 * min(uncertainty, 9.99):.0f} % at 68 % confidence "
+              "(ASHRAE Guideline 14)",
               "" if uncertainty <= UNCERTAINTY_ALLOWED else "report for longer; the guideline allows 50 %"),
         _weather(baseline, reporting, "the baseline's", "extend the baseline to such weather"),
         _missing(pd.concat([baseline, reporting])),
@@ -114,7 +116,7 @@ def _enough(found: Switchback, confidence: float) -> Check:
     fewest, half = runs // 2, found.saving.half_width(confidence)
     enough = fewest >= _FEWEST_RUNS and half <= 0.5 * abs(found.saving.value)
     ratio = half / max(abs(found.saving.value), 1e-9)
-    told = f"{len(acts)} days in {runs} runs; the interval is ± {min(ratio, 99.0):.0%} of the saving"
+    told = f"{len(acts)} days in {runs} runs; the interval is ± {100 * min(ratio, 99.0):.0f} % of the saving"
     advice = "" if enough else f"go on to about {found.days_needed(confidence)} days"
     if fewest < _FEWEST_RUNS:
         advice = f"switch more often: each control needs {_FEWEST_RUNS} runs of days"
@@ -131,7 +133,7 @@ def _carried(found: Switchback, days: pd.DataFrame) -> Check:
     if found.carried is not None:
         carried, share = found.carried, found.carried.value / found.own_power
         is_there = carried.p_value < 2.0 * _LEVEL
-        words = f"the day after the new control acted takes {-share:+.1%} energy{told}"
+        words = f"the day after the new control acted takes {100 * (-share):+.1f} % energy{told}"
         then = "it is counted in the saving of permanent use; longer runs of days show it with less noise"
         return Check(name, not is_there, words, then if is_there else "")
     warm = state is not None and state.p_value < _LEVEL and abs(state.value) > 0.1
@@ -145,14 +147,14 @@ def _weather(first: pd.DataFrame, second: pd.DataFrame, whose: str, advice: str)
     low, high = float(known.min()), float(known.max())
     margin = _BEYOND * (high - low)
     outside = ((seen < low - margin) | (seen > high + margin)).mean()
-    told = f"{outside:.0%} of the days lie outside of {whose} {low - 273.15:.1f} to {high - 273.15:.1f} °C"
+    told = f"{100 * outside:.0f} % of the days lie outside of {whose} {low - 273.15:.1f} to {high - 273.15:.1f} °C"
     return Check("weather", bool(outside <= _MANY), told, "" if outside <= _MANY else advice)
 
 
 def _missing(days: pd.DataFrame) -> Check:
     columns = [c for c in ("power", "outdoor", "acts") if c in days]
     lost = days[columns].isna().any(axis=1).mean()
-    told = f"{lost:.0%} of the days lack energy, temperature or one control all day long"
+    told = f"{100 * lost:.0f} % of the days lack energy, temperature or one control all day long"
     return Check(
         "missing days",
         bool(lost <= _MANY),
@@ -169,7 +171,7 @@ def _changes(first: pd.DataFrame, second: pd.DataFrame, one: str, other: str) ->
     else:
         share = people.value / max(abs(float(first["occupancy"].mean())), 1e-9)
         changed = people.p_value < _LEVEL and abs(share) > _OCCUPANCY
-        yield Check("occupancy", not changed, f"{share:+.1%} from {one} to {other}",
+        yield Check("occupancy", not changed, f"{100 * share:+.1f} % from {one} to {other}",
                     "a non-routine change: put it into the model with --adjust" if changed else "")  # fmt: skip
     warmth = _difference(first, second, "zone")
     if warmth is None:

@@ -51,23 +51,28 @@ def test_what_counts_as_a_bad_write(drills: ModuleType, script: Callable[[str], 
     assert "from 20.4 to 22.5 in 30 s" in told(fine[0], (1.15, (2, 1), 85, 13, 22.5, True))[0]
 
 
+#: Parts, the wire, an operator, a clock, the device, the database, a plan: what takes about 20 s of one core.
+CHOSEN = (
+    "controller killed", "guard killed", "network cut", "operator overrides the first", "clock jumps ahead",
+    "writes refused", "database down", "plan out of range",
+)  # fmt: skip
+
+
 def test_real_drills(drills: ModuleType, script: Callable[[str], ModuleType]) -> None:
     if script("_postgres").programs() is None:
         pytest.skip("needs a PostgreSQL server (Debian: apt install postgresql)")
     top = Path(tempfile.mkdtemp(prefix="drills"))  # the database's user must get there, and not into pytest's folders
     top.chmod(0o755)
-    chosen = "controller killed,network cut,overrides the first"  # a part, the wire, an operator
     lines: list[str] = []
     try:
-        found = drills.run_drills(3, 7, top / "site", chosen, lines.append)
+        one_site = drills.run_drills(len(CHOSEN), 7, top / "site", ",".join(CHOSEN), lines.append)
     finally:
         shutil.rmtree(top, ignore_errors=True)
-    assert {one["fault"] for one in found["drills"]} == {
-        "controller killed", "network cut", "operator overrides the first",
-    }  # fmt: skip
+    found = drills.together([one_site], 1)
+    assert sorted(one["fault"] for one in found["drills"]) == sorted(CHOSEN)
     for one in found["drills"]:
         assert not one["bad_writes"] and not one["overridden"] and not one["not_back"], one
         assert not one["late"], one  # a control step is 1.5 s: a machine that stands still for a second fails here
-    assert found["lost"] == 0 and found["samples"] > 50 and found["writes"] > 5
-    assert found["not_replayed"] == [] and found["decisions"] > 25
-    assert "| all | 3 | 0 | 0 | 0 | 0 | 0 |" in drills.report(found)
+    assert found["lost"] == 0 and found["samples"] > 150 and found["writes"] > 20
+    assert found["not_replayed"] == [] and found["decisions"] > 75
+    assert "| all | 8 | 0 | 0 | 0 |" in drills.report(found)  # a busy machine may have points given back without need

@@ -1,8 +1,10 @@
-"""A small building in California, and a plain scenario of it."""
+"""A small building in California and a plain scenario of it; the bundled case made quick for tests of commands."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -16,6 +18,7 @@ from mpc.scenario.tariff import CarbonIntensity, Tariff
 from mpc.scenario.weather import Weather
 from thermal import Building, ZoneTable
 from thermal.case.building import Location, ZoneEntry
+from thermal.data import bundled_case_path
 
 BAY = Location(latitude=37.4, longitude=-122.1, elevation=20.0, timezone="America/Los_Angeles")
 
@@ -25,6 +28,24 @@ def building() -> Building:
     """Two rooms of 20 and 30 m2."""
     rooms = (ZoneEntry(name="east", volume=60, floor_area=20), ZoneEntry(name="west", volume=90, floor_area=30))
     return Building("two rooms", BAY, 0.0, ZoneTable(rooms))
+
+
+@pytest.fixture(scope="session")
+def coarse_case(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The bundled case in half hours: what commands make of it takes half as long as in five minutes."""
+    folder = tmp_path_factory.mktemp("coarse") / "coarse"
+    shutil.copytree(bundled_case_path(), folder)
+    telemetry = pd.read_parquet(folder / "telemetry.parquet")
+    telemetry.resample("30min", closed="right", label="right").mean().to_parquet(folder / "telemetry.parquet")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def blank_pictures() -> Iterator[None]:
+    """Pages with empty pictures: painting takes as long as a calibration, and tests of the reports look at them."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("mpc.reports.figures.style._uri", lambda figure: "data:image/svg+xml;base64,")
+        yield
 
 
 def mild_weather(grid: StepGrid) -> Weather:

@@ -28,9 +28,9 @@ def run(*arguments: str | Path) -> Any:
 
 
 @pytest.fixture(scope="module")
-def calibrated(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def calibrated(coarse_case: Path, blank_pictures: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("cli") / "results"
-    answer = run("calibrate", CASE, "--out", out, "--dx", "1.0", "--json")
+    answer = run("calibrate", coarse_case, "--out", out, "--dx", "1.0", "--json")
     assert answer.exit_code == 0, answer.stderr
     assert json.loads(answer.stdout) == json.loads((out / "calibration.json").read_text(encoding="utf-8"))
     return out
@@ -50,6 +50,11 @@ def test_help_has_an_example(command: str) -> None:
     answer = run(command, "--help")
     assert answer.exit_code == 0
     assert f"Example: buildingmpc {command}" in " ".join(answer.stdout.split())
+
+
+def test_help_keeps_units_in_brackets() -> None:
+    shown = (" ".join(run(command, "--help").stdout.split()) for command in ("verify", "experiment"))
+    assert ['--power "main [kW]"' in next(shown), "Longest length [h]." in next(shown)] == [True, True]
 
 
 def test_only_what_exists_is_offered() -> None:
@@ -211,60 +216,50 @@ def test_what_a_base_install_lacks_is_one_line(monkeypatch: pytest.MonkeyPatch) 
     assert doctor.missing_extras("pages", "plan") == ""
 
 
-def test_results_are_kept_unless_forced(calibrated: Path) -> None:
-    answer = run("calibrate", CASE, "--out", calibrated, "--dx", "1.0")
+def test_results_are_kept_unless_forced(coarse_case: Path, calibrated: Path) -> None:
+    answer = run("calibrate", coarse_case, "--out", calibrated, "--dx", "1.0")
     assert answer.exit_code == 2
     assert "ResultsExistError" in answer.stderr and "--force" in answer.stderr
     answer = run("check", CASE, "--out", calibrated / "calibration.json")
     assert answer.exit_code == 2 and "found a file" in answer.stderr
 
 
-def test_evaluate_takes_the_grid_of_the_parameters(calibrated: Path, tmp_path: Path) -> None:
-    interval = "2023-03-07T16:05/2023-03-11"
+def test_evaluate_takes_the_grid_of_the_parameters(coarse_case: Path, calibrated: Path, tmp_path: Path) -> None:
     out = tmp_path / "errors"
-    answer = run(
-        "evaluate",
-        CASE,
-        "--parameters",
-        calibrated / "calibration.json",
-        "--interval",
-        interval,
-        "--json",
-        "--out",
-        out,
-    )
+    answer = run("evaluate", coarse_case, "--parameters", calibrated / "calibration.json",
+                 "--interval", "2023-03-07T16:30/2023-03-11", "--json", "--out", out)  # fmt: skip
     assert (answer.exit_code, answer.stderr) == (0, "")
     found = json.loads(answer.stdout)
     assert found == json.loads((out / "evaluation.json").read_text(encoding="utf-8"))
     wanted = json.loads((calibrated / "evaluation.json").read_text(encoding="utf-8"))
     assert found["mae"] == pytest.approx(wanted["mae"], abs=1e-3)
-    assert list(found["by_horizon"]) == ["5min", "1h", "3h", "6h", "24h"]
+    assert list(found["by_horizon"]) == ["1h", "3h", "6h", "24h"]
     assert sorted(p.name for p in out.iterdir()) == ["evaluation.json", "predictions.parquet", "report.html"]
 
 
-def test_evaluate_without_parameters_is_uncalibrated(calibrated: Path) -> None:
-    answer = run("evaluate", CASE, "--dx", "1.0", "--interval", "2023-03-07T16:05/2023-03-11")
+def test_evaluate_without_parameters_is_uncalibrated(coarse_case: Path, calibrated: Path) -> None:
+    answer = run("evaluate", coarse_case, "--dx", "1.0", "--interval", "2023-03-07T16:30/2023-03-11")
     assert answer.exit_code == 0
     assert "uncalibrated start values" in answer.stdout and "F1_S" in answer.stdout
     before = json.loads((calibrated / "calibration.json").read_text(encoding="utf-8"))["uncalibrated"]["held_out"]
     assert f"{before['mae']:.3f}" in answer.stdout
 
 
-def test_simulate(calibrated: Path, tmp_path: Path) -> None:
-    arguments = ("simulate", CASE, "--start", "2023-03-05", "--end", "2023-03-06T12:00", "--out", tmp_path / "replay")
+def test_simulate(coarse_case: Path, calibrated: Path, tmp_path: Path) -> None:
+    arguments = ("simulate", coarse_case, "--start", "2023-03-05", "--end", "2023-03-06T12:00", "--out", tmp_path / "replay")
     answer = run(*arguments, "--parameters", calibrated / "calibration.json")
     assert (answer.exit_code, answer.stderr) == (0, "")
     assert "F1_W" in answer.stdout and "report.html" in answer.stdout
     content = json.loads((tmp_path / "replay" / "simulation.json").read_text(encoding="utf-8"))
-    assert (content["steps"], content["step_seconds"]) == (432, 300.0)
+    assert (content["steps"], content["step_seconds"]) == (72, 1800.0)
     assert content["start"] == "2023-03-05T00:00:00-05:00" and 0.0 < content["mae"] < 2.0
     assert set(content["by_zone"]) == {"F1_N", "F1_W", "F1_C", "F1_E", "F1_S"}
 
 
-def test_a_folder_of_cases_reports_each(spoilt: Path, tmp_path: Path) -> None:
-    shutil.copytree(CASE, spoilt.parent / "whole")
+def test_a_folder_of_cases_reports_each(coarse_case: Path, blank_pictures: None, spoilt: Path, tmp_path: Path) -> None:
+    shutil.copytree(coarse_case, spoilt.parent / "whole")
     out = tmp_path / "out"
-    answer = run("calibrate", spoilt.parent, "--out", out, "--dx", "2.0", "--json")
+    answer = run("calibrate", spoilt.parent, "--out", out, "--dx", "2.0", "--starts", "1", "--json")
     assert answer.exit_code == 1
     cases = json.loads(answer.stdout)["cases"]
     assert cases["spoilt"]["error"] == "CaseError"
@@ -278,7 +273,7 @@ def test_a_folder_of_cases_reports_each(spoilt: Path, tmp_path: Path) -> None:
 
 
 def test_a_solver_that_does_not_converge_is_a_failure_with_results(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    coarse_case: Path, blank_pictures: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from dataclasses import replace
 
@@ -291,7 +286,7 @@ def test_a_solver_that_does_not_converge_is_a_failure_with_results(
         return replace(result, solver=replace(result.solver, success=False, status="Maximum_Iterations_Exceeded"))
 
     monkeypatch.setattr(calibration, "calibrate", stopped)
-    answer = run("calibrate", CASE, "--out", tmp_path / "results", "--dx", "2.0")
+    answer = run("calibrate", coarse_case, "--out", tmp_path / "results", "--dx", "2.0", "--structure", "drawn", "--starts", "1")
     assert answer.exit_code == 1
     assert "did not converge: Maximum_Iterations_Exceeded" in answer.stderr
     assert "do not rely on these numbers" in answer.stdout

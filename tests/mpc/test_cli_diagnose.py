@@ -18,24 +18,26 @@ from thermal.effects.catalogue import CATALOGUE
 
 CASE = str(bundled_case_path())
 
+pytestmark = pytest.mark.usefixtures("blank_pictures")
+
 
 def run(*arguments: str | Path) -> Any:
     """Run the command in this process."""
     return CliRunner().invoke(app, [str(a) for a in arguments])
 
 
-def test_diagnose_writes_what_it_says(tmp_path: Path) -> None:
+def test_diagnose_writes_what_it_says(coarse_case: Path, tmp_path: Path) -> None:
     out = tmp_path / "gap"
-    answer = run("diagnose", CASE, "--out", out, "--dx", "2.0", "--tune", "2023-03-01/2023-03-07",
-                 "--hold-out", "2023-03-07T00:05/2023-03-11", "--json")  # fmt: skip
+    answer = run("diagnose", coarse_case, "--out", out, "--dx", "2.0", "--tune", "2023-03-01/2023-03-07",
+                 "--hold-out", "2023-03-07T00:30/2023-03-11", "--json")  # fmt: skip
     assert answer.exit_code == 0, answer.stderr
     assert json.loads(answer.stdout) == json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
     assert sorted(p.name for p in out.iterdir()) == [
         "calibration.json", "diagnosis.json", "missing_watts.parquet", "predictions.parquet", "report.html",
     ]  # fmt: skip
     held_out = json.loads(answer.stdout)["intervals"]["held_out"]
-    assert [i["start"] for i in held_out] == ["2023-03-07T00:05:00-05:00"]
-    again = run("diagnose", CASE, "--out", out)
+    assert [i["start"] for i in held_out] == ["2023-03-07T00:30:00-05:00"]
+    again = run("diagnose", coarse_case, "--out", out)
     assert again.exit_code == 2 and "ResultsExistError" in again.stderr
 
 
@@ -69,9 +71,9 @@ def test_bad_input_is_named(arguments: tuple[str, ...], error: str) -> None:
     assert not Path("unused").exists()
 
 
-def test_calibrate_takes_effects(tmp_path: Path) -> None:
+def test_calibrate_takes_effects(coarse_case: Path, tmp_path: Path) -> None:
     out = tmp_path / "sun"
-    answer = run("calibrate", CASE, "--out", out, "--dx", "2.0", "--starts", "1", "--effects", "solar_gain")
+    answer = run("calibrate", coarse_case, "--out", out, "--dx", "2.0", "--starts", "1", "--effects", "solar_gain")
     assert answer.exit_code == 0, answer.stderr
     content = json.loads((out / "calibration.json").read_text(encoding="utf-8"))
     assert [e["effect"] for e in content["effects"]] == ["solar_gain"]
@@ -89,9 +91,9 @@ def test_effects_lists_the_catalogue_and_what_a_case_can_tell() -> None:
     assert "sun through the windows" in shown and "no zone lies above another" in shown
 
 
-def test_what_is_known_or_ruled_out_is_not_sought(tmp_path: Path) -> None:
+def test_what_is_known_or_ruled_out_is_not_sought(coarse_case: Path, tmp_path: Path) -> None:
     out = tmp_path / "gap"
-    answer = run("diagnose", CASE, "--out", out, "--dx", "2.0", "--effects", "solar_gain", "--rule-out",
+    answer = run("diagnose", coarse_case, "--out", out, "--dx", "2.0", "--effects", "solar_gain", "--rule-out",
                  "sensor_bias,clock_shift", "--json")  # fmt: skip
     assert answer.exit_code == 0, answer.stderr
     found = json.loads(answer.stdout)
@@ -123,10 +125,10 @@ def test_effects_that_cannot_be_known_are_named(arguments: tuple[str, ...], mess
     assert not (tmp_path / "gap").exists()
 
 
-def test_a_folder_of_cases_is_diagnosed_case_by_case(tmp_path: Path) -> None:
+def test_a_folder_of_cases_is_diagnosed_case_by_case(coarse_case: Path, tmp_path: Path) -> None:
     cases = tmp_path / "cases"
     for name in ("one", "two"):
-        shutil.copytree(CASE, cases / name)
+        shutil.copytree(coarse_case, cases / name)
     text = (cases / "two" / "building.yaml").read_text(encoding="utf-8")
     (cases / "two" / "building.yaml").write_text(text.replace("zone: F1_N", "zone: G1_N"), encoding="utf-8")
     settings = ("--dx", "2.0", "--workers", "1", "--rule-out", "blinds")

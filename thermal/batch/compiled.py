@@ -1,12 +1,14 @@
-"""Runs of plain arithmetic of a program, compiled by numba (extra ``[fast]``)."""
+"""Loops of plain arithmetic of a program, compiled by numba (extra ``[fast]``)."""
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from thermal.batch.carried import copied, where
+from thermal.batch.elementary import elementary, split_exponent
+from thermal.batch.trace import Instruction
 from thermal.errors import MissingExtraError
 
 _EXPRESSIONS: dict[Any, str] = {
@@ -21,35 +23,66 @@ _EXPRESSIONS: dict[Any, str] = {
     copied: "{0}", where: "{1} if {0} != zero else {2}",
 }  # fmt: skip
 
-#: Instructions in a function, and in a loop: compilers take more than twice as long for twice as many.
-_TOGETHER, _IN_LOOP = 240, 60
+#: In single precision these are arithmetic too; see `thermal.batch.elementary`.
+_IN_SINGLE: dict[Any, str] = {
+    np.exp: "exp({0})", np.expm1: "expm1({0})", np.log: "log({0})", np.arctan: "arctan({0})",
+    np.power: "power({0}, {1}, {2}, {3}, {4})",
+}  # fmt: skip
 
-#: Function, inputs and output.
-Instruction = tuple[Any, tuple[Any, ...], NDArray[Any]]
+#: Instructions in a function: compilers take more than twice as long for twice as many.
+_TOGETHER = 240
+
 #: Where an array begins, and its strides, in elements.
 Place = tuple[int, tuple[int, ...]]
 
 
-def compiles(function: Any) -> bool:
-    """Tell whether an instruction is plain arithmetic.
+class Placed(NamedTuple):
+    """An instruction whose values have their places in memory.
 
     Parameters
     ----------
     function : callable
-        Of the instruction.
+        What is done.
+    inputs : tuple
+        Arrays, or plain numbers.
+    output : ndarray
+        What is written.
+    stored : bool
+        Whether others than its loop look at the output.
     """
-    return function in _EXPRESSIONS
+
+    function: Any
+    inputs: tuple[Any, ...]
+    output: NDArray[Any]
+    stored: bool = True
 
 
-def compile_run(work: NDArray[Any], run: Sequence[Instruction]) -> list[Callable[[], Any]]:
-    """Compile instructions that follow each other.
+def compiles(note: Instruction, dtype: Any) -> bool:
+    """Tell whether an instruction is plain arithmetic.
+
+    Parameters
+    ----------
+    note : Instruction
+        Any.
+    dtype : numpy.dtype
+        Precision.
+    """
+    function = note.function
+    if function is np.power and dtype == np.float32:
+        exponent = note.inputs[1]  # a whole one may be of a negative number
+        return isinstance(exponent, float) and exponent % 1.0 != 0.0 and abs(exponent) < 4.0
+    return function in _EXPRESSIONS or (dtype == np.float32 and function in _IN_SINGLE)
+
+
+def compile_loops(work: NDArray[Any], loops: Sequence[Sequence[Placed]]) -> list[Callable[[], Any]]:
+    """Compile loops that follow each other.
 
     Parameters
     ----------
     work : ndarray, shape (n,)
         Memory that all arrays lie in.
-    run : sequence of tuple
-        Of each instruction its function, its inputs and its output.
+    loops : sequence of sequence of Placed
+        Instructions over the same axes.
 
     Raises
     ------
@@ -61,78 +94,83 @@ def compile_run(work: NDArray[Any], run: Sequence[Instruction]) -> list[Callable
     except ImportError as error:
         advice = 'compiled batches need numba, which the extra brings: pip install "buildingmpc[fast]"'
         raise MissingExtraError(advice) from error
-    made = []
-    for begin in range(0, len(run), _TOGETHER):
-        part = run[begin : begin + _TOGETHER]
-        numbers = sorted({float(v) for _, inputs, _ in part for v in inputs if not isinstance(v, np.ndarray)})
-        names = {number: f"c{k}" for k, number in enumerate(numbers)}
-        lines = [f"    c{k} = numbers[{k}]" for k in range(len(numbers))]
-        for together in _loops(work, part):
-            lines += _loop(work, together, names)
-        text = "def run(w, numbers, zero, one):\n" + "\n".join(lines) + "\n"
-        scope: dict[str, Any] = {"np": np}
-        exec(compile(text, "<thermal.batch.compiled>", "exec"), scope)  # text of numbers and templates alone
-        kind = numba.from_dtype(work.dtype)
-        signature = numba.void(kind[::1], kind[::1], kind, kind)
-        compiled = numba.njit(signature, error_model="numpy")(scope["run"])
-        arguments = work, np.array([*numbers, 0.0], dtype=work.dtype), work.dtype.type(0.0), work.dtype.type(1.0)
-        made.append(_bound(compiled, arguments))
+    number, kind = work.dtype.type, numba.from_dtype(work.dtype)
+    scope: dict[str, Any] = {"np": np, "zero": number(0.0), "one": number(1.0)}
+    scope |= elementary() if work.dtype == np.float32 else {}
+    made, lines, count = list[Callable[[], Any]](), list[str](), 0
+    for place, loop in enumerate(loops):
+        lines += _Written(work, loop, scope).lines
+        count += len(loop)
+        if count < _TOGETHER and place + 1 < len(loops):
+            continue
+        text = "def run(w):\n" + "\n".join(lines) + "\n"
+        exec(compile(text, "<thermal.batch.compiled>", "exec"), scope)  # text of places and templates alone
+        compiled = numba.njit(numba.void(kind[::1]), error_model="numpy")(scope["run"])
+        made.append(_bound(compiled, work))
+        lines, count = [], 0
     return made
 
 
-def _bound(function: Any, arguments: tuple[Any, ...]) -> Callable[[], Any]:
-    return lambda: function(*arguments)
+def _bound(function: Any, work: NDArray[Any]) -> Callable[[], Any]:
+    return lambda: function(work)
 
 
-def _loops(work: NDArray[Any], run: Sequence[Instruction]) -> list[list[Instruction]]:
-    """Put instructions over the same axes into one loop, as long as none reads or writes what another element has."""
-    found: list[list[Instruction]] = []
-    touched, written = list[Place](), list[Place]()
-    axes: tuple[int, ...] = ()
-    for function, inputs, output in run:
-        shape = output.shape
-        reads = [work_place(work, np.broadcast_to(v, shape)) for v in inputs if isinstance(v, np.ndarray)]
-        target = work_place(work, output)
-        fits = bool(found) and axes == shape and len(found[-1]) < _IN_LOOP
-        fits = fits and all(not _overlap(shape, place, target) or place == target for place in touched)
-        fits = fits and all(not _overlap(shape, w, read) or w == read for w in written for read in reads)
-        if not fits:
-            found.append([])
-            touched, written, axes = [], [], shape
-        found[-1].append((function, inputs, output))
-        touched += [*reads, target]
-        written.append(target)
-    return found
+class _Written:
+    """A loop as text: what an inner axis does not change is read outside of it, what nobody looks at is not stored."""
+
+    def __init__(self, work: NDArray[Any], loop: Sequence[Placed], scope: dict[str, Any]) -> None:
+        self._work, self._scope = work, scope
+        self._lengths = [n for n in loop[0].output.shape if n > 1]
+        self._known = dict[Place, str]()
+        self._reads: list[list[str]] = [[] for _ in range(len(self._lengths) + 1)]
+        self._body = list[str]()
+        last = {self._place(step.output, step): k for k, step in enumerate(loop)}
+        for k, step in enumerate(loop):
+            place, name = self._place(step.output, step), f"b{k}"
+            self._body.append(f"{name} = {self._expression(step)}")
+            self._known[place] = name
+            if step.stored and last[place] == k:
+                self._body.append(f"w[{_index(place)}] = {name}")
+
+    @property
+    def lines(self) -> list[str]:
+        """Text, to stand in a function."""
+        found = [f"    {read}" for read in self._reads[0]]
+        for axis, length in enumerate(self._lengths):
+            indent = "    " * (axis + 1)
+            found.append(f"{indent}for i{axis} in range({length}):")
+            found += [f"{indent}    {read}" for read in self._reads[axis + 1]]
+        return [*found, *("    " * (len(self._lengths) + 1) + line for line in self._body)]
+
+    def _expression(self, step: Placed) -> str:
+        template = _EXPRESSIONS.get(step.function) or _IN_SINGLE[step.function]
+        inputs = list(step.inputs)
+        if step.function is np.power:
+            rises = inputs[1] > 0.0
+            inputs[1:] = [*split_exponent(inputs[1]), 0.0 if rises else np.inf, np.inf if rises else 0.0]
+        return template.format(*(self._term(value, step) for value in inputs))
+
+    def _term(self, value: Any, step: Placed) -> str:
+        if not isinstance(value, np.ndarray):
+            name = f"c{float(value).hex()}".replace(".", "_").replace("-", "m").replace("+", "p")
+            self._scope[name] = self._work.dtype.type(value)
+            return name
+        place = self._place(value, step)
+        if place not in self._known:
+            name = self._known[place] = f"a{len(self._known)}"
+            depth = max((axis + 1 for axis, stride in enumerate(place[1]) if stride), default=0)
+            self._reads[depth].append(f"{name} = w[{_index(place)}]")
+        return self._known[place]
+
+    def _place(self, array: NDArray[Any], step: Placed) -> Place:
+        shape = step.output.shape
+        begin, strides = work_place(self._work, np.broadcast_to(array, shape))
+        return begin, tuple(s for s, n in zip(strides, shape, strict=True) if n > 1)
 
 
-def _overlap(shape: tuple[int, ...], one: Place, other: Place) -> bool:
-    """Tell whether two places may share an element."""
-    ends = [begin + sum((n - 1) * s for n, s in zip(shape, strides, strict=True)) for begin, strides in (one, other)]
-    return one[0] <= ends[1] and other[0] <= ends[0]
-
-
-def _loop(work: NDArray[Any], together: Sequence[Instruction], names: dict[float, str]) -> list[str]:
-    """Write one loop over all elements of the outputs of some instructions."""
-    shape = together[0][2].shape
-    axes = [k for k, length in enumerate(shape) if length > 1] or [len(shape) - 1]
-    lines = [f"{'    ' * (depth + 1)}for i{k} in range({shape[k]}):" for depth, k in enumerate(axes)]
-    inner, known = "    " * (len(axes) + 1), dict[Place, str]()
-    for function, inputs, output in together:
-        terms = []
-        for value in inputs:
-            if not isinstance(value, np.ndarray):
-                terms.append(names[float(value)])
-                continue
-            place = work_place(work, np.broadcast_to(value, shape))
-            if place not in known:
-                known[place] = f"a{len(known)}"
-                lines.append(f"{inner}{known[place]} = w[{_index(place, axes)}]")
-            terms.append(known[place])
-        target = work_place(work, output)
-        name = known.setdefault(target, f"a{len(known)}")
-        lines.append(f"{inner}{name} = {_EXPRESSIONS[function].format(*terms)}")
-        lines.append(f"{inner}w[{_index(target, axes)}] = {name}")
-    return lines
+def _index(place: Place) -> str:
+    begin, strides = place
+    return " + ".join([str(begin), *(f"{s} * i{k}" for k, s in enumerate(strides) if s)])
 
 
 def work_place(work: NDArray[Any], array: NDArray[Any]) -> Place:
@@ -147,9 +185,3 @@ def work_place(work: NDArray[Any], array: NDArray[Any]) -> Place:
     """
     begin = (array.__array_interface__["data"][0] - work.__array_interface__["data"][0]) // work.itemsize
     return begin, tuple(s // work.itemsize for s in array.strides)
-
-
-def _index(place: Place, axes: Sequence[int]) -> str:
-    begin, strides = place
-    terms = [f"i{k}" if strides[k] == 1 else f"{strides[k]} * i{k}" for k in axes if strides[k]]
-    return " + ".join([str(begin), *terms])

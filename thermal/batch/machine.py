@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from thermal._types import IntArray
 from thermal.batch.carried import Reduce, Take, copied, where
-from thermal.batch.compiled import Instruction, work_place
+from thermal.batch.compiled import Placed, work_place
+from thermal.batch.trace import Instruction
 
 _OPERATIONS: dict[Any, Callable[..., Any]] = {
     np.add: operator.add, np.subtract: operator.sub, np.multiply: operator.mul, np.divide: operator.truediv,
@@ -30,20 +31,21 @@ _OPERATIONS: dict[Any, Callable[..., Any]] = {
 }  # fmt: skip
 
 
-def interprets(function: Any) -> bool:
+def interprets(note: Instruction) -> bool:
     """Tell whether an instruction is arithmetic that can be unrolled.
 
     Parameters
     ----------
-    function : callable
-        Of the instruction.
+    note : Instruction
+        Any.
     """
+    function = note.function
     known = function in _OPERATIONS or function is np.matmul or isinstance(function, Take)
     return known or (isinstance(function, Reduce) and function.function in _OPERATIONS)
 
 
 def machine_runs(
-    work: NDArray[Any], constant: NDArray[np.bool_], wanted: NDArray[np.bool_], runs: Sequence[Sequence[Instruction]]
+    work: NDArray[Any], constant: NDArray[np.bool_], wanted: NDArray[np.bool_], runs: Sequence[Sequence[Placed]]
 ) -> list[Callable[[], Any]]:
     """Make runs of instructions that read and write the memory of a program.
 
@@ -54,7 +56,7 @@ def machine_runs(
     constant, wanted : ndarray of bool, shape (n,)
         Which of its numbers never change, and which are looked at by others than these runs.
     runs : sequence of sequence of tuple
-        Of each instruction its function, its inputs and its output.
+        Instructions that follow each other.
     """
     made = [_Unrolled(work, constant, run) for run in runs]
     looked_at = wanted.copy()
@@ -66,12 +68,12 @@ def machine_runs(
 class _Unrolled:
     """Instructions as operations on numbers, by place in memory."""
 
-    def __init__(self, work: NDArray[Any], constant: NDArray[np.bool_], run: Sequence[Instruction]) -> None:
+    def __init__(self, work: NDArray[Any], constant: NDArray[np.bool_], run: Sequence[Placed]) -> None:
         self._work, self._constant, self._memory = work, constant, ca.SX.sym("w", work.size)
         self.read: dict[int, Any] = {}
         self._written: dict[int, Any] = {}
-        for function, inputs, output in run:
-            self._carry_out(function, inputs, output)
+        for step in run:
+            self._carry_out(step.function, step.inputs, step.output)
 
     def function(self, looked_at: NDArray[np.bool_]) -> Callable[[], Any]:
         """Make the function that writes what is looked at.

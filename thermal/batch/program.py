@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal.batch.compiled import compile_run, compiles
+from thermal.batch.compiled import Placed, compile_loops, compiles
+from thermal.batch.loops import Loop, in_loops, kept_within, taken_apart
 from thermal.batch.machine import interprets, machine_runs, places_of
 from thermal.batch.trace import Instruction, Slot, Tape, Traced, View
 from thermal.errors import ModelError
@@ -44,22 +45,29 @@ class Program:
         ModelError.unless(members >= 1, "batch", "1 member or more", repr(members))
         self.members, self.dtype = members, np.dtype(dtype)
         alone = members == 1 and self.dtype == np.float64 and not compiled
-        self._numbers, plain = compiled or alone, interprets if alone else compiles
+        self._numbers, within = compiled or alone, set[int]()
         notes = _needed(tape)
-        notes = _grouped(notes, plain) if self._numbers else notes
+        if compiled:
+            fits = partial(compiles, dtype=self.dtype)
+            notes = taken_apart(notes, members, fits)
+            loops = in_loops(notes, members, fits)
+            within = kept_within(loops, tape.kept)
+        else:
+            loops = _runs(notes, interprets if alone else lambda note: False)
         self._work, self._end = self._memory(tape, notes), 0
         self._kept = sorted(tape.kept)
         self._arrays: dict[int, NDArray[Any]] = {k: self._array(tape.slots[k]) for k in self._kept}
         self._constants: dict[Any, NDArray[Any]] = {}
-        run = self._laid_out(tape, notes)
-        self._count, self._code = len(run), list[Callable[[], Any]]()
-        parts = [(fits, list(part)) for fits, part in groupby(run, key=lambda step: self._numbers and plain(step[0]))]
+        placed = self._laid_out(tape, loops, within)
+        self._count, self._code = len(notes), list[Callable[[], Any]]()
+        parts = [(loop.axes is not None, steps) for loop, steps in zip(loops, placed, strict=True)]
         unrolled = iter(self._unrolled(parts) if alone else ())
-        for fits, steps in parts:
-            if fits:
-                self._code += [next(unrolled)] if alone else compile_run(self._work, steps)
+        for plain, group in groupby(parts, key=lambda part: part[0]):
+            steps = [steps for _, steps in group]
+            if plain:
+                self._code += [next(unrolled) for _ in steps] if alone else compile_loops(self._work, steps)
             else:
-                self._code += [partial(function, *inputs, out=output) for function, inputs, output in steps]
+                self._code += [partial(s.function, *s.inputs, out=s.output) for call in steps for s in call]
 
     def __len__(self) -> int:
         return self._count
@@ -79,40 +87,40 @@ class Program:
         for instruction in self._code:
             instruction()
 
-    def _unrolled(self, parts: Sequence[tuple[bool, Sequence[Any]]]) -> list[Callable[[], Any]]:
+    def _unrolled(self, parts: Sequence[tuple[bool, Sequence[Placed]]]) -> list[Callable[[], Any]]:
         """Hand runs of arithmetic to the virtual machine, with what others look at: what is kept, and other calls."""
         masks = np.zeros((2, self._end), dtype=bool)
-        calls = [v for fits, steps in parts if not fits for _, inputs, _ in steps for v in inputs]
+        calls = [v for plain, steps in parts if not plain for step in steps for v in step.inputs]
         looked_at = [*(self._arrays[k] for k in self._kept), *(v for v in calls if isinstance(v, np.ndarray))]
         for mask, arrays in zip(masks, (self._constants.values(), looked_at), strict=True):
             for array in arrays:
                 mask[places_of(self._work, array)] = True
         constant, wanted = masks
-        return machine_runs(self._work[: self._end], constant, wanted, [steps for fits, steps in parts if fits])
+        return machine_runs(self._work[: self._end], constant, wanted, [steps for plain, steps in parts if plain])
 
-    def _laid_out(
-        self, tape: Tape, notes: Sequence[Instruction]
-    ) -> list[tuple[Any, tuple[Any, ...], NDArray[Any]]]:
-        """Give each value a place for as long as it is needed."""
-        last = {v.slot.number: n for n, note in enumerate(notes) for v in _views(note)}
+    def _laid_out(self, tape: Tape, loops: Sequence[Loop], within: set[int]) -> list[list[Placed]]:
+        """Give each value a place for as long as it is needed; one that is needed within a loop alone has its own."""
+        last = {v.slot.number: n for n, loop in enumerate(loops) for note in loop.notes for v in _views(note)}
         free: dict[Any, list[NDArray[Any]]] = defaultdict(list)
-        run = []
-        for n, note in enumerate(notes):
-            inputs = {v.slot.number: v.slot for v in note.inputs if isinstance(v, View)}
-            own = note.output.slot
-            ended = [s for k, s in inputs.items() if last[k] == n and k not in tape.kept and k != own.number]
-            operands = tuple(self._operand(v) for v in note.inputs)
-            in_place = isinstance(note.function, np.ufunc) and note.function is not np.matmul
-            if not in_place and own.number not in self._arrays:
-                self._arrays[own.number] = self._place(own, free)
+        placed = []
+        for n, loop in enumerate(loops):
+            slots = {v.slot.number: v.slot for note in loop.notes for v in _views(note)}
+            ended = [s for k, s in slots.items() if last[k] == n and k not in tape.kept and k not in within]
+            steps = []
+            for note in loop.notes:
+                own, function = note.output.slot, note.function
+                operands = tuple(self._operand(v) for v in note.inputs)
+                if len(loop.notes) == 1 and isinstance(function, np.ufunc) and function is not np.matmul:
+                    for slot in [s for s in ended if s.number != own.number]:  # may be written in place
+                        free[_form(slot)].append(self._arrays[slot.number])
+                        ended.remove(slot)
+                if own.number not in self._arrays:
+                    self._arrays[own.number] = self._array(own) if own.number in within else self._place(own, free)
+                steps.append(Placed(function, operands, self._operand(note.output), own.number not in within))
             for slot in ended:
                 free[_form(slot)].append(self._arrays[slot.number])
-            if own.number not in self._arrays:
-                self._arrays[own.number] = self._place(own, free)
-            run.append((note.function, operands, self._operand(note.output)))
-            if last[own.number] == n and own.number not in tape.kept:
-                free[_form(own)].append(self._arrays[own.number])
-        return run
+            placed.append(steps)
+        return placed
 
     def _place(self, slot: Slot, free: dict[Any, list[NDArray[Any]]]) -> NDArray[Any]:
         spare = free[_form(slot)]
@@ -174,20 +182,23 @@ def _needed(tape: Tape) -> list[Instruction]:
     return found[::-1]
 
 
-def _grouped(notes: Sequence[Instruction], fits: Callable[[Any], bool]) -> list[Instruction]:
-    """Order instructions so that plain arithmetic comes in few long runs; none passes what it depends on."""
-    left, done, plain = list(notes), list[Instruction](), True
+def _runs(notes: Sequence[Instruction], fits: Callable[[Instruction], bool]) -> list[Loop]:
+    """Order instructions so that those that fit come in few long runs; none passes what it depends on."""
+    left, runs, plain = list(notes), list[Loop](), True
     while left:
-        waiting, read, written = list[Instruction](), set[int](), set[int]()
+        waiting, taken, read, written = list[Instruction](), list[Instruction](), set[int](), set[int]()
         for note in left:
             takes = {v.slot.number for v in note.inputs if isinstance(v, View)}
             gives = note.output.slot.number
             free = not (takes & written) and gives not in written and gives not in read
-            if free and fits(note.function) == plain:
-                done.append(note)
+            if free and fits(note) == plain:
+                taken.append(note)
             else:
                 waiting.append(note)
                 read |= takes
                 written.add(gives)
+        if plain and taken:
+            runs.append(Loop(((), 1), taken))
+        runs += [] if plain else [Loop(None, [note]) for note in taken]
         left, plain = waiting, not plain
-    return done
+    return runs

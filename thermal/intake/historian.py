@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from thermal._types import FloatArray, IntArray
+from thermal._types import FloatArray
 from thermal.case.building import Building
 from thermal.case.points import POINT_TYPES
 from thermal.case.telemetry import INDEX, LONGEST_STEP
 from thermal.errors import CaseError, PlanError
-from thermal.intake.resample import LEAST_COVERED, LONGEST_COMMAND, step_means
+from thermal.intake.historian_steps import StepSums, samples_of_rows, slots_of, slots_of_row
+from thermal.intake.resample import LONGEST_COMMAND
 from thermal.intake.series import RawSeries
 from thermal.intake.source import shown
 from thermal.intake.stamps import ClockReport
@@ -32,12 +33,6 @@ from thermal.units import QUANTITIES
 
 #: Schema that live operation keeps its samples in.
 SCHEMA = "buildingmpc"
-
-#: PostgreSQL counts microseconds from 2000, this many after 1970 [us].
-_EPOCH = 946_684_800_000_000
-
-#: A sample as PostgreSQL sends it: time [us since 2000], value.
-_SAMPLE = np.dtype([("time", ">i8"), ("value", ">f8")])
 
 _DAY = pd.Timedelta(days=1)
 
@@ -96,13 +91,12 @@ def read_historian(
     with _connected(address, schema) as cursor:
         names = dict(cursor.execute("SELECT id, name FROM point ORDER BY name").fetchall())
         PlanError.unless(names, shown(address), "a historian with points", "none")
-        steps = _Steps(list(names), ends, step)
+        steps = StepSums(list(names), ends, step)
         days = _days(first, end)
         for number, day in enumerate(days):
             if progress is not None:
                 progress("reading samples", number, len(days))
-            for points, samples in _samples_of(cursor, day):
-                steps.add(points, samples)
+            _add_day(cursor, day, steps)
     found = {name: _series(name, steps.means(row, name), ends, lead) for row, name in enumerate(names.values())}
     PlanError.unless(
         any(found.values()), shown(address), f"samples from {start} to {end}", "none", "look at --start and --end"
@@ -195,11 +189,16 @@ def pack_days(address: str, before: pd.Timestamp, schema: str = SCHEMA) -> int:
             kept = cursor.execute("SELECT coalesce(sum(count), 0) FROM packed_day WHERE day = %s", [day.date()])
             if here == kept.fetchone()[0]:
                 continue
-            cursor.execute("DELETE FROM packed_day WHERE day = %s", [day.date()])
+            for table in ("packed_day", "packed_slots"):
+                cursor.execute(f"DELETE FROM {table} WHERE day = %s", [day.date()])
             cursor.execute(
                 f"INSERT INTO packed_day SELECT %s, point, count(*), {_PACKED} FROM sample WHERE time >= %s AND time "
                 "< %s GROUP BY point", [day.date(), *bounds]
             )  # fmt: skip
+            rows = cursor.execute("SELECT point, samples FROM packed_day WHERE day = %s", [day.date()]).fetchall()
+            if rows:
+                packed = [array.tobytes() for array in slots_of(*samples_of_rows(rows), day)]
+                cursor.execute("INSERT INTO packed_slots VALUES (%s, %s, %s, %s)", [day.date(), *packed])
             done += 1
         return done
 
@@ -239,12 +238,21 @@ def _days(start: pd.Timestamp, end: pd.Timestamp) -> list[pd.Timestamp]:
     return list(pd.date_range(start.tz_convert("UTC").normalize(), end.tz_convert("UTC"), freq="D"))
 
 
-def _samples_of(cursor: Any, day: pd.Timestamp) -> Iterator[tuple[IntArray, Any]]:
-    """Ids and samples of a day: as it is packed, else packed on the way."""
-    is_packed = cursor.execute("SELECT to_regclass('packed_day') IS NOT NULL").fetchone()[0]
+def _add_day(cursor: Any, day: pd.Timestamp, steps: StepSums) -> None:
+    """Add a day: sums of its slots where these are packed and steps are made of them, else its samples."""
+    date = [day.date()]
+    is_packed = cursor.execute("SELECT to_regclass('packed_slots') IS NOT NULL").fetchone()[0]
+    if is_packed and steps.has_slots(day):
+        row = cursor.execute("SELECT points, sums, counts FROM packed_slots WHERE day = %s", date).fetchone()
+        if row is not None:
+            few = steps.add_slots(day, *slots_of_row(row))
+            if len(few):
+                asked = "SELECT point, samples FROM packed_day WHERE day = %s AND point = ANY(%s)"
+                steps.keep(*samples_of_rows(cursor.execute(asked, [*date, few.tolist()]).fetchall()))
+            return
     rows = []
     if is_packed:
-        rows = cursor.execute("SELECT point, samples FROM packed_day WHERE day = %s", [day.date()]).fetchall()
+        rows = cursor.execute("SELECT point, samples FROM packed_day WHERE day = %s", date).fetchall()
     if not rows:
         bounds = [day.to_pydatetime(), (day + _DAY).to_pydatetime()]
         rows = cursor.execute(
@@ -252,64 +260,7 @@ def _samples_of(cursor: Any, day: pd.Timestamp) -> Iterator[tuple[IntArray, Any]
             "GROUP BY point", bounds
         ).fetchall()  # fmt: skip
     if rows:
-        lengths = [len(blob) // _SAMPLE.itemsize for _, blob in rows]
-        samples = np.frombuffer(b"".join(blob for _, blob in rows), dtype=_SAMPLE)
-        yield np.repeat(np.array([point for point, _ in rows]), lengths), samples
-
-
-class _Steps:
-    """Means of many points over steps, filled a day at a time."""
-
-    def __init__(self, ids: list[int], ends: pd.DatetimeIndex, step: float) -> None:
-        self._rows = np.full(max(ids) + 1, -1)
-        self._rows[ids] = np.arange(len(ids))
-        self._ends, self._step, self._width = ends, step, round(step * 1e6)
-        self._begin = ends[0].value // 1000 - self._width - _EPOCH
-        self._sums = np.zeros((len(ids), len(ends)))
-        self._counts = np.zeros((len(ids), len(ends)), dtype=np.uint32)
-        self._dense, self._sparse = np.zeros(len(ids), dtype=int), np.zeros(len(ids), dtype=int)
-        self._kept: dict[int, list[tuple[IntArray, FloatArray]]] = {}
-
-    def add(self, points: IntArray, samples: Any) -> None:
-        """Add the samples of a day."""
-        times, values = samples["time"].astype(np.int64) - self._begin, samples["value"].astype(float)
-        steps = (times - 1) // self._width  # a sample at the end of a step is of that step
-        known = (steps >= 0) & (steps < len(self._ends)) & np.isfinite(values)
-        rows, steps, values, times = self._rows[points[known]], steps[known], values[known], times[known]
-        if not len(rows):
-            return
-        first, span = int(steps.min()), int(steps.max() - steps.min()) + 1
-        of, size = rows * span + steps - first, len(self._dense) * span
-        counts = np.bincount(of, minlength=size).reshape(-1, span)
-        sums = np.bincount(of, weights=values, minlength=size).reshape(-1, span)
-        self._sums[:, first : first + span] += sums
-        self._counts[:, first : first + span] += counts.astype(np.uint32)
-        total = counts.sum(axis=1)
-        dense = total >= span
-        self._dense += dense & (total > 0)
-        self._sparse += ~dense & (total > 0)
-        sparse = ~dense[rows]
-        order = np.lexsort((times[sparse], rows[sparse]))
-        sorted_rows, at = rows[sparse][order], np.flatnonzero(sparse)[order]
-        for group in np.split(at, np.flatnonzero(np.diff(sorted_rows)) + 1) if len(at) else ():
-            self._kept.setdefault(int(rows[group[0]]), []).append((times[group], values[group]))
-
-    def means(self, row: int, name: str) -> FloatArray | None:
-        """Means of a point, shape (n_step,); None without samples."""
-        if self._dense[row] + self._sparse[row] == 0:
-            return None
-        if self._dense[row] >= self._sparse[row]:
-            counts = self._counts[row]
-            least = max(1.0, LEAST_COVERED * float(np.median(counts[counts > 0])))
-            return np.where(counts >= least, self._sums[row] / np.maximum(1, counts), np.nan)
-        times = np.concatenate([t for t, _ in self._kept[row]]) + self._begin + _EPOCH
-        values = np.concatenate([v for _, v in self._kept[row]])
-        stamps = pd.DatetimeIndex(times.astype("datetime64[us]")).tz_localize("UTC")
-        return step_means(pd.Series(values, index=stamps), self._ends, self._step, holds=_holds(name))
-
-
-def _holds(name: str) -> bool:
-    return name.endswith(("setpoint", "command"))
+        steps.add(*samples_of_rows(rows))
 
 
 def _series(name: str, means: FloatArray | None, ends: pd.DatetimeIndex, lead: int) -> RawSeries | None:

@@ -9,7 +9,7 @@ import pandas as pd
 from thermal.case.telemetry import MISSING
 from thermal.errors import CaseError, PlanError
 from thermal.intake.source import read_table, shown
-from thermal.intake.stamps import ClockReport, parse_stamps, to_utc
+from thermal.intake.stamps import ClockReport, parse_stamps, spelled, to_utc
 from thermal.units import QUANTITIES, check_unit
 
 #: Names of the column of stamps, of values, and of units in a long table.
@@ -85,7 +85,7 @@ def read_series(source: str, table: str = "", timezone: str = "") -> tuple[dict[
     stamps = parse_stamps(cells, f"{where}: column {stamp!r}", report)
     if stamps.dt.tz is None and not timezone:
         advice = "say whose clock they show: --tz Europe/Berlin"
-        raise PlanError(f"{where}: column {stamp!r}", "stamps with an offset", repr(str(cells.iloc[0])), advice)
+        raise PlanError(f"{where}: column {stamp!r}", "stamps with an offset", repr(spelled(cells.iloc[0])), advice)
     frame = frame.drop(columns=stamp)
     value = next((lower[name] for name in VALUES if name in lower and lower[name] in frame), None)
     keys = [name for name in map(str, frame) if name != value and name.casefold() not in UNITS]

@@ -128,11 +128,23 @@ def parse_stamps(cells: pd.Series, where: str, report: ClockReport) -> pd.Series
     report.unreadable += int(stamps.isna().sum() - wrong.sum())
     if wrong.any():
         report.impossible += int(wrong.sum())
-        report.first_impossible = report.first_impossible or str(cells[wrong].iloc[0])
+        report.first_impossible = report.first_impossible or spelled(cells[wrong].iloc[0])
     if stamps.isna().all():
         advice = "write ISO 8601, such as 2023-07-06T07:10:00+02:00"
-        raise PlanError(where, f"a column of {EXPECTED}", repr(cells.iloc[0]) if len(cells) else "nothing", advice)
+        found = repr(spelled(cells.iloc[0])) if len(cells) else "nothing"
+        raise PlanError(where, f"a column of {EXPECTED}", found, advice)
     return stamps
+
+
+def spelled(cell: object) -> str:
+    """Spell a cell of time stamps; pandas spells none before the year 1 or after 9999.
+
+    Parameters
+    ----------
+    cell
+        A time, text or a number.
+    """
+    return str(cell.asm8) if isinstance(cell, pd.Timestamp) and not 1 <= cell.year <= 9999 else str(cell)
 
 
 def _read(cells: pd.Series, where: str) -> pd.Series:

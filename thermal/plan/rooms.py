@@ -19,6 +19,7 @@ from thermal.plan.drawing import Drawing, checked_scale
 from thermal.plan.guard import extra
 from thermal.plan.ink import Ink, ink_of, walls_of
 from thermal.plan.survey import OUTSIDE_LABEL, WALL_LABEL, Door, FloorSurvey, PlanSettings, rooms_of
+from thermal.plan.windows import see_windows
 
 _PEAK_REACH = 0.15  # m: lower peaks of the distance within this are part of a higher one's basin
 _WIDENS = 1.12  # -, of a door's width, reached close behind it: a corridor is at least that much wider than its doors
@@ -210,7 +211,10 @@ def find_rooms(
         No building is drawn at this scale.
     """
     ink = ink_of(drawing, checked_scale(metres_per_pixel), straighten)
-    return survey_ink(ink, drawing.source, settings or PlanSettings())
+    settings = settings or PlanSettings()
+    survey = survey_ink(ink, drawing.source, settings)
+    windows, said = see_windows(survey, settings.thickest_wall)
+    return replace(survey, windows=windows, remarks=(*survey.remarks, said))
 
 
 def survey_ink(ink: Ink, source: str, settings: PlanSettings) -> FloorSurvey:

@@ -147,7 +147,7 @@ class FloorSurvey:
     ink : ndarray of bool or None, shape (n_row, n_col)
         What is drawn there, walls or not, for pictures.
     windows : tuple of Window
-        Of a vector drawing that shows them.
+        Those that the drawing shows.
     """
 
     source: str

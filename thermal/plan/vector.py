@@ -18,7 +18,7 @@ from thermal.plan.guard import check_pixels, checked_file, checked_number, extra
 from thermal.plan.ink import FINE, Ink
 from thermal.plan.rooms import survey_ink
 from thermal.plan.survey import FloorSurvey, PlanSettings, rooms_of
-from thermal.plan.windows import find_windows
+from thermal.plan.windows import NOT_CALLED, find_windows
 from thermal.plan.words import TextLine, name_rooms
 
 VECTOR_KINDS = (".dxf",)
@@ -101,6 +101,8 @@ def read_dxf(
     if content.windows:
         upright = [line @ own[:2, :2].T + own[:2, 2] for line in content.windows]
         survey = replace(survey, windows=find_windows(upright, survey, settings.thickest_wall))
+    else:
+        survey = replace(survey, remarks=(*survey.remarks, NOT_CALLED))
     named = name_rooms(survey, content.texts)
     return replace(named, placement=own @ np.diag([metres, metres, 1.0]))
 

@@ -1,11 +1,13 @@
 """What stands in a ``plant.yaml``, as a schema."""
 
 import re
+from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
+from mpc.adapters.described.electric import ElectricEntry
 from mpc.adapters.described.programs import EnergyPlusProgram, ServerProgram, SiteProgram, UnitProgram
 from thermal.case.building import Entry, Location, Number, Positive, Text
 from thermal.errors import CaseError
@@ -105,15 +107,22 @@ class Input(Signal):
         Smallest value of a modulating actuator that is not off [library's unit].
     release : str, optional
         Input that hands the actuator over while it is 1; ``X_activate`` of ``X_u`` by default where it is there.
+    capacity : tuple of tuple of float
+        Of a setpoint: outdoor temperatures [K], rising, and the most heat of its machine at each [W], as of a data
+        sheet; on straight lines between them.
     """
 
     range: tuple[Kelvin, Kelvin] | None = None
     kind: Literal["continuous", "on_off", "modulating"] | None = None
     minimum: Number | None = None
     release: Text | None = None
+    capacity: tuple[tuple[Kelvin, Positive], ...] = ()
 
     @model_validator(mode="after")
     def _fits(self) -> "Input":
+        outdoor = [pair[0] for pair in self.capacity]
+        if any(b <= a for a, b in pairwise(outdoor)):
+            raise ValueError(f"expected a capacity over rising outdoor temperatures, found {outdoor} K")
         if (self.kind == "modulating") != (self.minimum is not None):
             raise ValueError("expected a minimum of a modulating actuator, and of no other")
         return self
@@ -295,6 +304,8 @@ class PlantFile(Entry):
         What it costs.
     emissions : Emissions, optional
         What it emits; not counted by default.
+    electric : ElectricEntry, optional
+        Battery and photovoltaics, whose powers are not among those of `energy`.
     series : tuple of str
         Where named series come from, in this order: ``unit``, the tables that a unit of BOPTEST brings; a ``.csv``
         file; ``outputs``, variables of the unit from a run ahead under its own control.
@@ -324,6 +335,7 @@ class PlantFile(Entry):
     energy: Energy = Energy()
     prices: Prices | None = None
     emissions: Emissions | None = None
+    electric: ElectricEntry | None = None
     series: tuple[Text, ...] = ()
     weather: Annotated[
         Annotated[Text, Tag("<file>")] | Annotated[dict[Text, Named], Tag("<points>")],
@@ -333,3 +345,13 @@ class PlantFile(Entry):
         ),
     ] | None = None  # fmt: skip
     forecast: Outlook = Outlook()
+
+    @model_validator(mode="after")
+    def _battery_is_there(self) -> "PlantFile":
+        battery = None if self.electric is None else self.electric.battery
+        if battery is not None:
+            for name, known, what in ((battery.command, self.actuators, "an actuator"),
+                                      (battery.level, self.measurements, "a measurement")):  # fmt: skip
+                if name not in known:
+                    raise ValueError(f"expected {what} of the description as the battery's, found {name!r}")
+        return self

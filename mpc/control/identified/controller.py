@@ -11,9 +11,13 @@ import numpy as np
 import pandas as pd
 
 from calibration.estimation.state_space import REFERENCE
+from mpc.control.identified.ahead import Ahead
+from mpc.control.identified.by_rule import RuleEstimate, estimate_rule
 from mpc.control.identified.conformal import AFTER, ConformalBackOff, Guarantee, risen
+from mpc.control.identified.electric import Electric, ElectricNow
+from mpc.control.identified.meter import ElectricMeter
 from mpc.control.identified.observer import GreyBoxObserver
-from mpc.control.identified.problem import SCALE, Ahead, IdentifiedProblem
+from mpc.control.identified.problem import SCALE, IdentifiedProblem
 from mpc.control.identified.thermostats import Thermostats
 from mpc.control.solvers.solution import Status
 from mpc.control.solvers.stages import StageSolution, StageSolver
@@ -28,6 +32,10 @@ from thermal.case.building import Location
 
 #: Share of a day's starts that may be used at once [-].
 _AT_ONCE = 1.0 / 3.0
+
+#: Tolerances of the solver [-]: batteries and charges make problems nearly linear, whose optimum is flat; 1e-3 costs
+#: less than a tenth of a percent there.
+_EXACT, _LINEAR = 1e-6, 1e-3
 
 #: A duty above this is a run [-].
 _HALF = 0.5
@@ -90,6 +98,8 @@ class PlannedAction(dict[str, float]):
     zone, power : ndarray
         Expected at the edges of the steps, shape (N + 1, n_zone) [K], and electricity and other carriers over them,
         shape (N, 2) [W].
+    rule : RuleEstimate or None
+        What the plan and the rule cost over the horizon; None where electricity is decided too.
     """
 
     def __init__(self, values: Mapping[str, float], stamp: pd.Timestamp, source: str, reasons: tuple[str, ...]) -> None:
@@ -99,6 +109,7 @@ class PlannedAction(dict[str, float]):
         self.solution: StageSolution | None = None
         self.zone: FloatArray = np.empty((0, 0))
         self.power: FloatArray = np.empty((0, 2))
+        self.rule: RuleEstimate | None = None
 
 
 class IdentifiedController:
@@ -121,11 +132,13 @@ class IdentifiedController:
         Where it stands, for the sun.
     settings : IdentifiedSettings, optional
         Choices.
+    electric : Electric, optional
+        Battery, photovoltaics and charges; machines alone, by the price of electricity, by default.
 
     Raises
     ------
     ControlError
-        When the plant lacks an actuator of the model.
+        When the plant lacks an actuator of the model, or the battery's.
     """
 
     def __init__(
@@ -134,11 +147,15 @@ class IdentifiedController:
         actuators: tuple[Actuator, ...],
         location: Location,
         settings: IdentifiedSettings | None = None,
+        electric: Electric | None = None,
     ) -> None:
-        need_actuator("mpc", [m.machine.name for m in model.maps], actuators, every=True)
+        battery = [electric.command] if electric is not None and electric.command else []
+        need_actuator("mpc", [m.machine.name for m in model.maps] + battery, actuators, every=True)
         self.model, self.settings, self._location = model, settings or IdentifiedSettings(), location
         self._actuators = {a.name: a for a in actuators}
-        self._problem, self._observer = IdentifiedProblem(model), GreyBoxObserver(model)
+        self._problem, self._observer = IdentifiedProblem(model, electric), GreyBoxObserver(model)
+        self._meter = None if electric is None else ElectricMeter(electric, model)
+        self._tolerance = _EXACT if electric is None else _LINEAR
         self._solver: StageSolver | None = None
         self._before: tuple[Ahead, FloatArray] | None = None
         self._plan: StageSolution | None = None
@@ -152,6 +169,7 @@ class IdentifiedController:
         self.conformal = None if asked is None else ConformalBackOff(asked, zones, self.settings.back_off)
         self._edges: FloatArray = np.empty((0, zones))
         self._kept: FloatArray = np.empty((0, zones))
+        self._now: ElectricNow | None = None
         self.back_offs: list[float] = []
 
     def _back_off(self, ahead: Ahead) -> FloatArray:
@@ -181,22 +199,32 @@ class IdentifiedController:
         ahead = Ahead.of(self.model, forecast, self._location)
         self._observe(measurements, ahead)
         if self._solver is None or self._solver.n_steps != len(ahead.outdoor):
-            self._solver, self._plan = StageSolver(self._problem.stage, len(ahead.outdoor), tolerance=1e-6), None
+            self._solver = StageSolver(self._problem.stage, len(ahead.outdoor), tolerance=self._tolerance)
+            self._plan = None
         self._kept = self._back_off(ahead)
+        if self._meter is not None:
+            self._now = self._meter.read(measurements, forecast, self._location)
         self.back_offs.append(float(self._kept[0].mean()))
-        solution = self._decided(ahead)
-        levels = solution.decisions[0] if solution is not None else self._by_rule(measurements, ahead)
+        solution, on = self._decided(ahead), np.array([runs.on for runs in self._runs])
+        whole = None if solution is None else solution.decisions[0]
+        levels = self._by_rule(measurements, ahead) if whole is None else whole[: len(self.model.maps)]
         source = "optimal plan" if solution is not None else "rules"
         reasons = () if solution is not None else ("the solver found no plan",)
         self._note(levels)
         self._before, self._plan = (ahead, levels), solution
         stamp = measurements.stamp
-        action = PlannedAction(self._values(levels, solution, ahead), stamp, source, reasons)
+        values = self._values(levels, solution, ahead)
+        if whole is not None:
+            values |= self._problem.command(whole)
+        if self._meter is not None:
+            self._meter.note(levels, values, ahead, self._observer.state)
+        action = PlannedAction(values, stamp, source, reasons)
         action.step, action.seconds = self.model.step, time.perf_counter() - begin
         if solution is not None:
             action.solution = solution
             action.zone = solution.states[:, : len(self.model.box.zones)] + REFERENCE
             action.power = self._powers(solution, ahead)
+            action.rule = self._compared(solution, ahead, on) if self._meter is None else None
         return action
 
     def _observe(self, measurements: Measurements, ahead: Ahead) -> None:
@@ -205,7 +233,8 @@ class IdentifiedController:
             self._observer.start(measurements, float(ahead.outdoor[0]))
             return
         before, levels = self._before
-        self._thermostats.learn(measurements, self._observer.zones(measurements), float(before.outdoor[0]))
+        outdoor = self._observer.outdoor(measurements, before)
+        self._thermostats.learn(measurements, self._observer.zones(measurements), outdoor)
         self._observer.update(measurements, before, levels)
         if self.conformal is not None:
             realised = self._inside(self._observer.zones(measurements) - REFERENCE, before)
@@ -277,14 +306,15 @@ class IdentifiedController:
         state, solver = self._observer.state, self._solver
         if solver is None:
             return None
-        data = self._problem.data(state, ahead, self._kept, self.settings.comfort_price, ends)
-        guess = np.full((len(ahead.outdoor), len(self.model.maps)), _HALF)
+        data = self._problem.data(state, ahead, self._kept, self.settings.comfort_price, ends, self._now)
+        guess = np.full((len(ahead.outdoor), self._problem.decisions), _HALF)
         if self._plan is not None:
             guess = self._plan.shifted()[1]
         found = solver.solve(data, self._problem.stage.follow(data, guess), guess)
         if found.status is Status.FAILED:
             return None
-        chosen = ends[0] + (ends[1] - ends[0]) * np.clip(found.decisions, 0.0, 1.0)
+        chosen, m = np.clip(found.decisions, 0.0, 1.0), len(self.model.maps)
+        chosen[:, :m] = ends[0] + (ends[1] - ends[0]) * chosen[:, :m]
         return replace(found, decisions=chosen)
 
     def _by_rule(self, measurements: Measurements, ahead: Ahead) -> FloatArray:
@@ -307,23 +337,24 @@ class IdentifiedController:
     def _values(self, levels: FloatArray, solution: StageSolution | None, ahead: Ahead) -> dict[str, float]:
         """Values of the actuators for levels."""
         count = len(self.model.box.zones)
-        end = (self._observer.state if solution is None else solution.states[1])[:count] + REFERENCE
+        planned = self._observer.state[None] if solution is None else solution.states[1:]
+        zone = planned[:, :count] + REFERENCE
         most, values = self._thermostats.most(ahead.outdoor[:1])[0], dict[str, float]()
         for k, found in enumerate(self.model.maps):
             level = float(levels[k])
             if found.operation == "setpoint":
                 actuator = self._actuators[found.machine.name]
-                told = self._thermostats.tell(k, level, most[k], end, self._edge(found, ahead))
+                told = self._thermostats.tell(k, level, most[k], zone, self._edges_of(found, ahead))
                 value = float(np.clip(told, actuator.lowest, actuator.highest))
             else:
                 value = self._command(found, level)
             values[found.machine.name] = value
         return values
 
-    def _edge(self, found: MachineMap, ahead: Ahead) -> float:
-        """Lower edge of the band of the zones of a machine, and what is kept from it [K]."""
+    def _edges_of(self, found: MachineMap, ahead: Ahead) -> tuple[float, float]:
+        """Edges of the band of the zones of a machine, the lower one with what is kept from it [K]."""
         served = [k for k, name in enumerate(self.model.box.zones) if name in found.machine.serves]
-        return float((ahead.lower[0] + self._kept[0])[served].max())
+        return float((ahead.lower[0] + self._kept[0])[served].max()), float(ahead.upper[:2, served].min())
 
     def _command(self, found: MachineMap, level: float) -> float:
         """Value of a machine's actuator for a level."""
@@ -336,9 +367,16 @@ class IdentifiedController:
             return actuator.minimum if value > 0.5 * (low + actuator.minimum) else low
         return float(np.clip(value, low, high))
 
+    def _compared(self, solution: StageSolution, ahead: Ahead, on: FloatArray) -> RuleEstimate:
+        """Hold a plan against the rule on the same model."""
+        most = self._thermostats.most(ahead.outdoor)
+        free = np.zeros_like(most), np.ones_like(most)
+        data = self._problem.data(self._observer.state, ahead, self._kept, self.settings.comfort_price, free)
+        return estimate_rule(self._problem, ahead, data.parameters, (solution.states, solution.decisions), most, on)
+
     def _powers(self, solution: StageSolution, ahead: Ahead) -> FloatArray:
         """Give expected electricity and other carriers, shape (N, 2) [W]."""
-        emitter = REFERENCE + solution.states[:-1] @ self.model.box.emitter_weights
+        emitter = REFERENCE + solution.states[:-1, : self.model.box.capacity.size] @ self.model.box.emitter_weights
         powers = np.zeros((len(solution.decisions), 2))
         for carrier, base in self.model.base.items():
             powers[:, int(carrier != "electricity")] += base

@@ -7,7 +7,7 @@ import numpy as np
 from calibration.estimation.state_space import REFERENCE
 from calibration.grey_box.fit import steady_gain
 from calibration.grey_box.network import NODES
-from mpc.control.identified.problem import Ahead
+from mpc.control.identified.ahead import Ahead
 from mpc.identify.model import PlantModel
 from mpc.loop.plant import Measurements
 from thermal._types import FloatArray
@@ -39,6 +39,21 @@ class GreyBoxObserver:
             Of the last step.
         """
         return np.array([measurements[c] if c in measurements else np.nan for c in self._columns])
+
+    def outdoor(self, measurements: Measurements, before: Ahead) -> float:
+        """Outdoor air over a step that has ended [K]: as measured, else as it was forecast.
+
+        Parameters
+        ----------
+        measurements : Measurements
+            Of that step.
+        before : Ahead
+            Whose first row was forecast for it.
+        """
+        for column in measurements.columns:
+            if column.rpartition("/")[2] == OUTDOOR_TEMPERATURE and np.isfinite(measurements[column]):
+                return measurements[column]
+        return float(before.outdoor[0])
 
     def start(self, measurements: Measurements, outdoor: float) -> None:
         """Begin at rest: nodes at the temperatures that the air would hold them at.
@@ -74,7 +89,7 @@ class GreyBoxObserver:
             Innovations: measured less predicted [K]; NaN where missing.
         """
         model, space = self.model, self._whole.space
-        outdoor = _first(measurements, OUTDOOR_TEMPERATURE, float(before.outdoor[0]))
+        outdoor = self.outdoor(measurements, before)
         emitter = REFERENCE + self.state[: space.order] @ model.box.emitter_weights
         heat = np.empty(len(model.maps))
         for k, found in enumerate(model.maps):
@@ -88,11 +103,3 @@ class GreyBoxObserver:
         self.state = self._matrix @ corrected
         self.state[: space.order] += space.drive @ u
         return np.asarray(error)
-
-
-def _first(measurements: Measurements, point: str, other: float) -> float:
-    """Value of the first column of a point, where there is one."""
-    for column in measurements.columns:
-        if column.rpartition("/")[2] == point and np.isfinite(measurements[column]):
-            return measurements[column]
-    return other

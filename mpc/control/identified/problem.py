@@ -10,14 +10,14 @@ import numpy as np
 
 from calibration.estimation.state_space import REFERENCE
 from calibration.grey_box.network import COP_AT, COP_PER
+from mpc.control.identified.ahead import Ahead
+from mpc.control.identified.electric import Electric, ElectricNow, ElectricStage
 from mpc.control.solvers.stages import StageData, StageProblem
+from mpc.identify.maps import EMITTER, OUTDOOR
 from mpc.identify.model import PlantModel
-from mpc.identify.telemetry import CARRIERS, facade_sun
-from mpc.scenario.forecast import Forecast
+from mpc.identify.telemetry import CARRIERS
 from mpc.scenario.rates import HOUR, KILOWATT_HOUR
 from thermal._types import FloatArray
-from thermal.case.building import Location
-from thermal.case.points import OUTDOOR_TEMPERATURE
 
 #: Cost is counted in parts of the currency: a day's is of order 1 to 100, as interior points like it [1/currency].
 SCALE = 10.0
@@ -27,78 +27,6 @@ _EVEN = 1e-4
 
 #: Band that a back-off leaves [K].
 _NARROWEST = 0.1
-
-_PRICES = {"electricity": "electricity_price", "gas": "gas_price"}
-
-
-@dataclass(frozen=True, eq=False)
-class Ahead:
-    """What is expected over a horizon, one row a step.
-
-    Parameters
-    ----------
-    outdoor : ndarray, shape (N,)
-        Outdoor air [K].
-    sun : ndarray, shape (N, n_sun)
-        Irradiances [W/m2].
-    gain : ndarray, shape (N, n_zone)
-        Heat of people, and the constant one [W].
-    prices : ndarray, shape (N, n_carrier)
-        Of each of `CARRIERS` [currency/kWh].
-    lower, upper : ndarray, shape (N, n_zone)
-        Comfort bands [K].
-    occupied : ndarray of bool, shape (N, n_zone)
-        Whether people are expected.
-    """
-
-    outdoor: FloatArray
-    sun: FloatArray
-    gain: FloatArray
-    prices: FloatArray
-    lower: FloatArray
-    upper: FloatArray
-    occupied: np.ndarray
-
-    @classmethod
-    def of(cls, model: PlantModel, forecast: Forecast, location: Location) -> Ahead:
-        """Read a forecast.
-
-        Parameters
-        ----------
-        model : PlantModel
-            Whose zones and irradiances are wanted.
-        forecast : Forecast
-            Of the plant.
-        location : Location
-            Where it stands.
-        """
-        table, zones = forecast.table, model.box.zones
-
-        def of_zones(name: str) -> list[str]:
-            return [f"{zone}/{name}" for zone in zones]
-
-        edges = of_zones("comfort_lower_temperature"), of_zones("comfort_upper_temperature")
-        told = [name for name in (*of_zones("occupancy_count_sensor"), *of_zones("internal_gain"), *_PRICES.values())
-                if name in table]  # fmt: skip
-        names = [OUTDOOR_TEMPERATURE, *edges[0], *edges[1], *told]
-        known = dict(zip(names, forecast.values(names, fill="hold").T, strict=True))
-
-        def columns(wanted: list[str]) -> FloatArray:
-            return np.column_stack([known.get(name, np.zeros(len(table))) for name in wanted])
-
-        suns = facade_sun(location, model.step, table) if model.box.suns else {}
-        sun = (
-            np.column_stack([suns[name] for name in model.box.suns])
-            if suns
-            else np.zeros((len(table), len(model.box.suns)))
-        )
-        people = of_zones("occupancy_count_sensor")
-        occupied = columns(people) > 0.0 if people[0] in known else np.ones((len(table), len(zones)), dtype=bool)
-        return cls(
-            known[OUTDOOR_TEMPERATURE], np.nan_to_num(sun),
-            columns(of_zones("internal_gain")) + model.box.parts["constant gain"],
-            columns([_PRICES.get(carrier, "") for carrier in CARRIERS]), columns(edges[0]), columns(edges[1]), occupied,
-        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,9 +41,43 @@ class IdentifiedProblem:
     ----------
     model : PlantModel
         Identified.
+    electric : Electric, optional
+        Battery, photovoltaics and charges; electricity alone is bought at its price by default.
     """
 
     model: PlantModel
+    electric: Electric | None = None
+
+    @cached_property
+    def _added(self) -> ElectricStage | None:
+        """What is electric, as a part of the stages."""
+        if self.electric is None:
+            return None
+        model, most = self.model, self.model.base.get(CARRIERS[0], 0.0)
+        for found in model.maps:
+            if CARRIERS[0] in found.powers:  # in the cold or in the mild, whatever its map says
+                most += max(
+                    float(found.at(found.powers[CARRIERS[0]], 1.0, OUTDOOR + d, EMITTER)) for d in (-30.0, 10.0)
+                )
+        return ElectricStage(self.electric, 1.5 * most, model.step)
+
+    @property
+    def decisions(self) -> int:
+        """Number of decisions of a step: those of the machines first."""
+        return self.stage.decision.numel()
+
+    def command(self, decisions: FloatArray) -> dict[str, float]:
+        """Value of the battery's actuator, where there is one.
+
+        Parameters
+        ----------
+        decisions : ndarray, shape (n_decision,)
+            Of a step.
+        """
+        added = self._added
+        if added is None or added.electric.battery is None:
+            return {}
+        return {added.electric.command: added.command(decisions[len(self.model.maps) :])}
 
     @cached_property
     def _space(self):  # type: ignore[no-untyped-def]
@@ -127,21 +89,32 @@ class IdentifiedProblem:
         model, box, space = self.model, self.model.box, self._space
         nz, ns, m = len(box.zones), len(box.suns), len(model.maps)
         x, u = ca.SX.sym("x", 4 * nz), ca.SX.sym("u", m)
-        p = ca.SX.sym("p", 1 + ns + nz + len(CARRIERS) + 2 * m)
+        p, added = ca.SX.sym("p", 1 + ns + nz + len(CARRIERS) + 2 * m), self._added
         outdoor, sun, gain, price, low, high = ca.vertsplit(p, np.cumsum([0, 1, ns, nz, len(CARRIERS), m, m]).tolist())
         chosen = low + (high - low) * u
         emitter = REFERENCE + ca.mtimes(ca.DM(box.emitter_weights.T), x)
-        heats, cost = [], ca.SX(0)
+        heats, cost, electricity = [], ca.SX(0), ca.SX(model.base.get(CARRIERS[0], 0.0))
         for k, found in enumerate(model.maps):
             slope = 1.0 + float(box.slopes[k]) * (outdoor - COP_AT) / COP_PER
             heats.append(found.at(found.heat, chosen[k], outdoor, emitter[k]) * slope)
             for carrier, curve in found.powers.items():
                 power = found.at(curve, chosen[k], outdoor, emitter[k])
-                cost += price[CARRIERS.index(carrier)] * power
+                if added is not None and carrier == CARRIERS[0]:
+                    electricity += power
+                else:
+                    cost += price[CARRIERS.index(carrier)] * power
         inputs = ca.vertcat(outdoor - REFERENCE, sun, *heats, gain)
         following = ca.mtimes(ca.DM(space.transition), x) + ca.mtimes(ca.DM(space.drive), inputs)
-        cost = SCALE * (cost * model.step / KILOWATT_HOUR + _EVEN * ca.sumsqr(u))
-        return StageProblem(x, u, p, following, cost, ca.SX(0), x[:nz], np.zeros(m), np.ones(m))
+        cost, end, banded = cost * model.step / KILOWATT_HOUR, ca.SX(0), x[:nz]
+        if added is not None:
+            after, paid = added.following(electricity, price[0])
+            following, cost, end = ca.vertcat(following, after), cost + paid, added.end_cost
+            banded = ca.vertcat(banded, *(added.state[name] for name in added.banded))
+            x, u = ca.vertcat(x, *added.state.values()), ca.vertcat(u, *added.decision.values())
+            p = ca.vertcat(p, added.generation)
+        cost = SCALE * (cost + _EVEN * ca.sumsqr(u))
+        m = u.numel()
+        return StageProblem(x, u, p, following, cost, SCALE * end, banded, np.zeros(m), np.ones(m))
 
     def data(
         self,
@@ -150,6 +123,7 @@ class IdentifiedProblem:
         back_off: FloatArray,
         comfort_price: float,
         ends: tuple[FloatArray, FloatArray],
+        now: ElectricNow | None = None,
     ) -> StageData:
         """Put together what changes.
 
@@ -165,6 +139,8 @@ class IdentifiedProblem:
             Of a zone's kelvin outside of its band for an hour [currency/K/h].
         ends : tuple of ndarray, shape (N, n_machine)
             Lowest and highest duties and loads of the steps [-].
+        now : ElectricNow, optional
+            Of what is electric; none generated, nothing stored and no peak by default.
         """
         box, step, count = self.model.box, self.model.step, len(ahead.outdoor)
         nodes, zones = box.capacity.size, len(box.zones)
@@ -178,4 +154,12 @@ class IdentifiedProblem:
             np.vstack([ahead.upper[:1], np.minimum(ahead.upper[:-1], ahead.upper[1:]), ahead.upper[-1:]]) - REFERENCE
         )
         price = np.full((count + 1, zones), SCALE * comfort_price * step / HOUR)
-        return StageData(state[:nodes], parameters, np.minimum(lower, upper), upper, price)
+        lower, start = np.minimum(lower, upper), state[:nodes]
+        if self._added is not None:
+            now = now or ElectricNow(np.zeros(count))
+            ends_of = self._added.bands(count)
+            lower, upper = np.hstack([lower, ends_of[0]]), np.hstack([upper, ends_of[1]])
+            price = np.hstack([price, SCALE * ends_of[2]])
+            start = np.concatenate([start, self._added.start(now)])
+            parameters = np.column_stack([parameters, now.generation / 1e3])
+        return StageData(start, parameters, lower, upper, price)

@@ -16,6 +16,9 @@ _IDLE = 0.02
 #: How far past the plan a setpoint is told where all heat is wanted [K]: beyond the difference of a thermostat.
 _PUSH = 0.5
 
+#: Error of forecast outdoor air a day ahead [K], which grows with the root of the time: what weather services reach.
+_FORECAST = 2.0
+
 
 class Thermostats:
     """Tells zones' own controllers where the air shall be at the end of the step, and learns where they cannot follow.
@@ -30,7 +33,8 @@ class Thermostats:
     """
 
     def __init__(self, model: PlantModel) -> None:
-        self._model, self._limits = model, [HeatLimit(found.limits) for found in model.maps]
+        self._model = model
+        self._limits = [HeatLimit(found.limits, found.sheet) for found in model.maps]
         self._is_led = np.array([found.operation == "setpoint" for found in model.maps], dtype=bool)
         self._told, self._zone = np.full(len(model.maps), np.nan), np.full(len(model.box.zones), np.nan)
         self._served = [
@@ -43,11 +47,12 @@ class Thermostats:
         Parameters
         ----------
         outdoor : ndarray, shape (N,)
-            Outdoor air [K].
+            Outdoor air that is forecast for the coming steps [K].
         """
+        error = _FORECAST * np.sqrt(np.arange(len(outdoor)) * self._model.step / 86_400.0)
         return np.column_stack(
             [
-                limit.at(outdoor) if led else np.ones(len(outdoor))
+                limit.at(outdoor, error) if led else np.ones(len(outdoor))
                 for limit, led in zip(self._limits, self._is_led, strict=True)
             ]
         )
@@ -62,7 +67,7 @@ class Thermostats:
         zone : ndarray, shape (n_zone,)
             Temperatures over the step [K].
         outdoor : float
-            Outdoor air [K].
+            Outdoor air over the step [K].
         """
         end = zone + 0.5 * np.nan_to_num(np.maximum(zone - self._zone, 0.0))
         self._zone = zone
@@ -76,8 +81,11 @@ class Thermostats:
             if load > _IDLE and (missing > OUT_OF_REACH or load > self._limits[k].at(np.array([outdoor]))[0]):
                 self._limits[k].learn(outdoor, load)
 
-    def tell(self, k: int, level: float, most: float, end: FloatArray, edge: float) -> float:
+    def tell(self, k: int, level: float, most: float, zone: FloatArray, edges: tuple[float, float]) -> float:
         """Choose a setpoint [K].
+
+        Where all heat is wanted it is the highest temperature that is planned, out of reach for now: a machine that
+        has more than was thought, or a zone that takes less, is not held back by the error.
 
         Parameters
         ----------
@@ -85,15 +93,17 @@ class Thermostats:
             Which machine.
         level, most : float
             Planned load, and the largest [-].
-        end : ndarray, shape (n_zone,)
-            Planned air at the end of the step [K].
-        edge : float
-            Temperature that the zone shall not fall below [K].
+        zone : ndarray, shape (n, n_zone)
+            Planned air at the ends of the coming steps [K].
+        edges : tuple of float
+            Temperatures that the zone shall not fall below, and that it is never told to rise above [K].
         """
         idle, full = self._model.maps[k].above
-        value = float(end[self._served[k]].mean()) + idle + min(level, 1.0) * (full - idle)
+        air = zone[:, self._served[k]].mean(axis=1)
+        value = float(air[0]) + idle + min(level, 1.0) * (full - idle)
         if level > most - _IDLE:
-            value += _PUSH
-        # a thermostat holds what it is told: told the edge it keeps the band where the model is wrong
-        self._told[k] = edge if level <= _IDLE else max(value, edge)
+            value = max(value + _PUSH, float(air.max()))
+        # a thermostat holds what it is told: within the edges it keeps the band where the model is wrong, or where the
+        # plan leaves the band for hours that it fears not to keep
+        self._told[k] = edges[0] if level <= _IDLE else max(min(value, edges[1]), edges[0])
         return float(self._told[k])

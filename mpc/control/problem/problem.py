@@ -227,17 +227,38 @@ class ControlProblem:
         rollout : Rollout
             Of the predictor, with the same data.
         """
-        peaks = data.peaks
-        rise = peaks.peaks(rollout.electric) - peaks.so_far
+        electricity, fuel = self.energy_prices(data)
         changes = self.differences @ self.shares(rollout.plan) - self.standing(data)
         return CostTerms(
-            electricity=float(data.electricity_price * self.hours @ rollout.electric) / KILOWATT,
-            gas=float(data.gas_price * self.hours @ rollout.fuel) / KILOWATT,
-            demand=float(peaks.rate @ rise) / KILOWATT,
+            electricity=float(electricity @ rollout.electric),
+            gas=float(fuel @ rollout.fuel),
+            demand=self.demand_charge(data, rollout.electric),
             comfort=float(self.penalty(data, rollout.zone[1:]).value.sum()),
             moves=self.move_weight * float(changes @ changes),
             storage=-data.heat_value * self.predictor.heat_content(rollout.end_state) / KILOWATT_HOUR,
         )
+
+    def energy_prices(self, data: HorizonData) -> tuple[FloatArray, FloatArray]:
+        """Cost of a watt of electricity and of fuel over each step, shape (n_steps,) [currency/W].
+
+        Parameters
+        ----------
+        data : HorizonData
+            Of the horizon.
+        """
+        return data.electricity_price * self.hours / KILOWATT, data.gas_price * self.hours / KILOWATT
+
+    def demand_charge(self, data: HorizonData, electric: FloatArray) -> float:
+        """Cost of rising above the peaks so far [currency].
+
+        Parameters
+        ----------
+        data : HorizonData
+            Of the horizon.
+        electric : ndarray, shape (n_steps,)
+            Electricity [W].
+        """
+        return float(data.peaks.rate @ (data.peaks.peaks(electric) - data.peaks.so_far)) / KILOWATT
 
     def energy_gradient(self, data: HorizonData, sensitivity: Sensitivity) -> FloatArray:
         """Gradient of energy and storage by the decisions, shape (D,) [currency].
@@ -249,8 +270,8 @@ class ControlProblem:
         sensitivity : Sensitivity
             Of the roll-out.
         """
-        by_plan = (data.electricity_price * self.hours) @ sensitivity.electric / KILOWATT
-        by_plan += (data.gas_price * self.hours) @ sensitivity.fuel / KILOWATT
+        electricity, fuel = self.energy_prices(data)
+        by_plan = electricity @ sensitivity.electric + fuel @ sensitivity.fuel
         if data.heat_value:
             by_plan -= data.heat_value / KILOWATT_HOUR * (self.predictor.heat_row @ sensitivity.end_state)
         return np.asarray(by_plan * self.span)

@@ -7,7 +7,6 @@ import contextlib
 import fcntl
 import json
 import os
-import signal
 from collections.abc import Mapping
 from typing import Any
 
@@ -21,6 +20,7 @@ from mpc.live.links.link import Link
 from mpc.live.links.make import make_links
 from mpc.live.notify import Notifier
 from mpc.live.operators import operator_key
+from mpc.live.pace import Pace
 from mpc.live.site import Site
 
 #: Ticks that the end of the guard takes at most, so that releases are seen to have been done.
@@ -65,16 +65,14 @@ class GuardProcess:
         )  # fmt: skip
         self.mailbox = Mailbox(operator_key(site.folder), self.clock.mono)
         self._results: dict[str, str] = {}
-        self._stop = asyncio.Event()
+        self._pace = Pace(self.clock)
         self._notifier = Notifier(site.file.notify, site.file.name)
         self._status: dict[str, Any] = {}
         self._answers: dict[str, str] = {}
 
     async def run(self) -> int:
         """Guard until it is ended; return the exit code."""
-        loop = asyncio.get_running_loop()
-        for number in (signal.SIGTERM, signal.SIGINT):
-            loop.add_signal_handler(number, self._stop.set)
+        self._pace.heed_signals()
         for link in self._links.values():
             await link.open()
         server = await serve_socket(self.site.sockets, self.mailbox, lambda: self._status)
@@ -97,18 +95,16 @@ class GuardProcess:
         left = _LAST_TICKS
         while True:
             begin = self.clock.mono()
-            stopping = self._stop.is_set()
+            stopping = self._pace.ending
             decision = await self.tick(stopping)
-            if stopping:
-                left -= 1
-                if not decision["giving_back"] or not left:
-                    return 0
-            wait = self.clock.real(self.rules.limits.tick - (self.clock.mono() - begin))
-            if stopping:
-                await asyncio.sleep(min(max(wait, 0.0), 0.2))
+            if not stopping:
+                await self._pace.rest(begin, self.rules.limits.tick)
                 continue
-            with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(self._stop.wait(), max(wait, 0.0))
+            left -= 1
+            if not decision["giving_back"] or not left:
+                return 0
+            wait = self.clock.real(self.rules.limits.tick - (self.clock.mono() - begin))
+            await asyncio.sleep(min(max(wait, 0.0), 0.2))
 
     async def tick(self, stopping: bool = False) -> dict[str, Any]:
         """Look, decide, write down, order; return the decision.

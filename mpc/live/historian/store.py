@@ -233,6 +233,7 @@ class Historian:
         def work(cursor: psycopg.Cursor[Any]) -> int:
             first = before.floor("us").tz_convert("UTC")
             cursor.execute("DELETE FROM packed_day WHERE day <= %s", [first.date()])  # of its own day samples are left
+            cursor.execute("DELETE FROM packed_slots WHERE day <= %s", [first.date()])
             cursor.execute("DELETE FROM sample WHERE time < %s", [first.to_pydatetime()])
             return int(cursor.rowcount)
 

@@ -1,4 +1,4 @@
-"""MQTT by paho: values are what was last published, as plain numbers or JSON with ``value``."""
+"""MQTT by paho: values are what was last published while it listened, as plain numbers or JSON with ``value``."""
 
 from __future__ import annotations
 
@@ -57,14 +57,16 @@ class MqttConnection:
         if self.link.tls:
             client.tls_set()
         client.on_connect = lambda one, *_: one.subscribe([(at.split()[0], 1) for at, _ in self.points.values()])
-        client.on_message = lambda _, __, message: self._take(message.topic, message.payload)
+        client.on_message = lambda _, __, message: self._take(message.topic, message.payload, message.retain)
         client.reconnect_delay_set(1, 10)
         client.connect_async(self.link.host, self.link.port)
         client.loop_start()
         self._client = client
 
-    def _take(self, topic: str, payload: bytes) -> None:
-        """Keep a value; what is no number counts as one that is missing."""
+    def _take(self, topic: str, payload: bytes, retained: bool) -> None:
+        """Keep a value; what is no number counts as one that is missing, what was retained has no known age."""
+        if retained:
+            return
         value = parse_payload(payload)
         with self._lock:
             self._seen[topic] = (time.monotonic(), value)

@@ -160,6 +160,7 @@ def site_status(site: Site) -> dict[str, Any]:
         "zone": site.plant.location.timezone, "status": guard,
         "controller": read_state(site.folder / "controller.json"),
         "collector": read_state(site.folder / "collector.json"),
+        "nightly": read_state(site.folder / "nightly.json"),
         "units": {name: "degC" for name in site.writable if "temperature" in name},
     }  # fmt: skip
 

@@ -61,6 +61,11 @@ def metrics(folder: Path, status: Mapping[str, Any]) -> bytes:
         gauge("samples_lost_total", "Samples that neither database nor disk took").set(collector["lost"])
         gauge("spool_waiting", "Whether samples wait on disk for the database").set(collector["waiting"])
         gauge("points_missing", "Points that the last reading did not get").set(collector["missing"])
+    night = read_state(folder / "nightly.json")
+    if night:
+        gauge("nightly_time_seconds", "When the building was last evaluated, since 1970").set(night["time"])
+        lasting = sum(one["until"] == "lasts" for one in night["events"])
+        gauge("nightly_changes", "Changes of the building that last").set(lasting)
     cpu = gauge("process_cpu_seconds_total", "CPU time of a part", ("part",))
     memory = gauge("process_resident_memory_bytes", "Resident memory of a part", ("part",))
     for part, pid in read_state(folder / "parts.json").items():

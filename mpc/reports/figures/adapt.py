@@ -29,6 +29,9 @@ WIDEST = 4.6
 #: Lengths of lines of text on a phone [characters]: of titles, and of labels beside rows.
 _TITLE, _ROW = 44, 20
 
+#: Height of a line of such a label [inch].
+_LINE = 0.15
+
 #: Entries of a legend beside each other on a phone, as far as so many characters go.
 _KEYS, _KEYS_LENGTH = 3, 46
 
@@ -135,7 +138,11 @@ def for_phone(figure: Figure) -> None:
             if isinstance(axis.get_major_locator(), FixedLocator):
                 marks = [mark.get_text() for mark in axis.get_majorticklabels()]
                 if max(map(len, marks), default=0) > length:
-                    axis.set_ticks(axis.get_majorticklocs(), [textwrap.fill(mark, length) for mark in marks])
+                    filled = [textwrap.fill(mark, length) for mark in marks]
+                    axis.set_ticks(axis.get_majorticklocs(), filled)
+                    if axis is axes.yaxis:  # a row of two lines needs the height of two
+                        most = max(text.count("\n") + 1 for text in filled)
+                        figure.set_figheight(max(figure.get_figheight(), 1.6 + _LINE * most * len(filled)))
         title = textwrap.fill(axes.get_title(loc="left"), _TITLE)
         legend, pad = axes.get_legend(), 6.0
         if legend is not None and _is_beside(legend, axes):

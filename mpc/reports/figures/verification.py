@@ -69,7 +69,7 @@ def share_picture(found: Verification) -> Picture:
             100.0 * share.value, number, xerr=100.0 * share.half_width(level), fmt="o", color=colour, capsize=4
         )
     axes.axvline(0.0, color=WARNING, linestyle="--", linewidth=0.9)
-    axes.set(yticks=np.arange(len(rows)), xlabel=f"share of the energy saved, {level:.0%} interval [%]")
+    axes.set(yticks=np.arange(len(rows)), xlabel=f"share of the energy saved, {100 * level:.0f} % interval [%]")
     axes.set_yticklabels([name for name, _, _ in rows])
     axes.set_ylim(len(rows) - 0.4, -0.6)
     return picture(figure, "Share of the energy saved, expected and realised, with intervals")

@@ -11,6 +11,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from mpc.environment.environment import ControlEnvironment
 from mpc.environment.office import Office, office_environment, office_vector_environment
+from mpc.environment.reward import EconomicReward
 from mpc.environment.vector import VectorEnvironment
 from mpc.environment.wrappers import DiscreteActions, DiscreteVectorActions, NormalizedObservations
 from mpc.errors import MpcError, PlantActionError
@@ -161,8 +162,12 @@ def test_what_does_not_fit_is_refused(make_environment: Any) -> None:
         def of_steps(self, done: Any, scenario: Any, first_step: int) -> float:
             return 0.0
 
+    class Anew(EconomicReward):  # what it says of many is not what it says of one
+        of_steps = Mine.of_steps
+
     for options, words in (
         ({"num_envs": 0}, "1 or more"), ({"single": make_environment(reward=Mine())}, "many plants at once"),
+        ({"single": make_environment(reward=Anew())}, "both of_values"),
         ({"autoreset_mode": AutoresetMode.DISABLED}, "NEXT_STEP or SAME_STEP"),
     ):  # fmt: skip
         with pytest.raises(MpcError, match=words):

@@ -11,8 +11,9 @@ import pandas as pd
 import pytest
 
 from mpc.baselines.plants import FullSpeed, OwnControl
+from mpc.control.identified.ahead import Ahead
 from mpc.control.identified.controller import IdentifiedController, IdentifiedSettings
-from mpc.control.identified.problem import Ahead, IdentifiedProblem
+from mpc.control.identified.problem import IdentifiedProblem
 from mpc.control.solvers.stages import StageSolver
 from mpc.errors import ControlError, PlantError
 from mpc.identify.excitation import Excitation
@@ -73,7 +74,7 @@ def test_a_model_and_its_telemetry_survive_their_files(
         read.frame, known.telemetry.frame, check_freq=False, check_names=False, check_index_type=False
     )
     (tmp_path / "model.json").write_text("{}")
-    with pytest.raises(ControlError, match="format 1, found format None"):
+    with pytest.raises(ControlError, match="format 2, found format None"):
         read_model(tmp_path)
     with pytest.raises(ControlError, match="a folder with model.json"):
         read_model(tmp_path / "none")

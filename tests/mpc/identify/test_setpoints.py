@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -9,8 +11,9 @@ import pytest
 from calibration.grey_box.network import GreyBox
 from mpc.control.identified.controller import IdentifiedController, IdentifiedSettings
 from mpc.control.identified.thermostats import Thermostats
+from mpc.errors import PlantError
 from mpc.identify.limits import HeatLimit
-from mpc.identify.machines import Machine
+from mpc.identify.machines import Machine, find_machines
 from mpc.identify.maps import Curve, Loads, MachineMap, map_machines
 from mpc.identify.model import PlantModel
 from mpc.loop.actuators import HEATING_SETPOINT, Actuator
@@ -58,10 +61,16 @@ def led(limits: tuple[tuple[float, float], ...] = ()) -> PlantModel:
 
 def test_a_setpoint_is_the_air_that_is_planned_for_the_end_of_the_step() -> None:
     thermostats = Thermostats(led())
-    end = np.array([292.0])
-    assert thermostats.tell(0, 0.5, 1.0, end, 288.0) == pytest.approx(292.0 + 0.1)
-    assert thermostats.tell(0, 1.0, 1.0, end, 288.0) == pytest.approx(292.0 + 0.3 + 0.5)  # all that there is
-    assert thermostats.tell(0, 0.0, 1.0, end, 288.0) == 288.0 and thermostats.tell(0, 0.5, 1.0, end, 293.0) == 293.0
+    end = np.array([[292.0], [292.2]])
+    assert thermostats.tell(0, 0.5, 1.0, end, (288.0, 297.0)) == pytest.approx(292.0 + 0.1)
+    assert thermostats.tell(0, 1.0, 1.0, end, (288.0, 297.0)) == pytest.approx(292.0 + 0.3 + 0.5)  # all that there is
+    rising = np.array([[292.0], [294.0], [293.0]])
+    assert thermostats.tell(0, 1.0, 1.0, rising, (288.0, 297.0)) == 294.0  # out of reach, whatever the model has wrong
+    assert thermostats.tell(0, 1.0, 1.0, rising, (288.0, 293.5)) == 293.5  # but within the band
+    assert (
+        thermostats.tell(0, 0.0, 1.0, end, (288.0, 297.0)) == 288.0
+        and thermostats.tell(0, 0.5, 1.0, end, (293.0, 297.0)) == 293.0
+    )
 
 
 def test_what_a_machine_gives_at_most_is_learned_where_its_setpoint_is_out_of_reach() -> None:
@@ -72,7 +81,7 @@ def test_what_a_machine_gives_at_most_is_learned_where_its_setpoint_is_out_of_re
     before, warm = thermostats.most(cold)[0, 0], thermostats.most(mild)[0, 0]
     assert 0.3 < before < 0.9 < warm <= 1.0  # it was never seen in such cold: less is relied on
     for told, zone, seen in ((293.0, 292.9, before), (293.0, 291.0, 0.4)):  # within reach, and out of it
-        thermostats.tell(0, 1.0, 1.0, np.array([told - 0.8]), 288.0)
+        thermostats.tell(0, 1.0, 1.0, np.array([[told - 0.8]]), (288.0, 297.0))
         thermostats.learn(Measurements(layout, 0, [2000.0]), np.array([zone]), 260.0)
         assert thermostats.most(cold)[0, 0] == pytest.approx(seen, abs=0.06)
     assert thermostats.most(mild)[0, 0] == pytest.approx(warm, abs=0.05)
@@ -85,6 +94,26 @@ def test_a_limit_is_the_posterior_of_a_gaussian_process() -> None:
     mean, spread = 1.0 + gain * 0.5, np.sqrt(0.08 * (1.0 - gain))
     assert limit.at(np.array([280.15]))[0] == pytest.approx(mean - spread)
     assert HeatLimit().at(np.array([250.0, 290.0])).tolist() == [1.0, 1.0]
+
+
+def test_a_data_sheet_says_what_was_never_seen() -> None:
+    """A compressor that stops at -12 degC: less is relied on where it may be colder; readings shift the whole sheet."""
+    sheet, cold = ((253.15, 0.3), (261.0, 0.3), (261.1, 0.8), (280.0, 1.0)), np.array([256.0, 261.6, 263.0, 280.0])
+    warm = 0.8 + 0.2 * np.array([0.9, 17.9]) / 18.9
+    assert HeatLimit((), sheet).at(cold, 1.0) == pytest.approx([0.3, 0.3, *warm])
+    assert HeatLimit([(261.05, 0.35)], sheet).at(cold)[1] > 0.65  # beside an edge a reading says nothing
+    seen = HeatLimit([(280.0, 0.9), (278.0, 0.88)], sheet).at(cold)
+    assert seen[3] == pytest.approx(0.86, abs=0.03) and 0.1 < seen[0] < 0.25
+    led_by_sheet = replace(led().maps[0], machine=replace(led().maps[0].machine, capacity=((253.15, 1500.0),)))
+    assert led_by_sheet.sheet == ((253.15, pytest.approx(0.3)),)
+
+
+def test_a_data_sheet_is_of_a_setpoint_whose_heat_is_measured() -> None:
+    thermostat, sheet = Actuator(NAME, "K", 285.15, 298.15), {NAME: ((260.0, 900.0),)}
+    (found,) = find_machines([thermostat], ["room/heating_power_sensor"], ["room"], (), sheet)
+    assert found.capacity == sheet[NAME]
+    with pytest.raises(PlantError, match="capacity: expected a setpoint whose heat is measured, found no heat"):
+        find_machines([thermostat], [], ["room"], (), sheet)
 
 
 def test_limits_are_read_from_the_steps_at_which_more_was_wanted() -> None:

@@ -126,6 +126,49 @@ def test_a_broker_is_read_and_written(broker: int) -> None:
     asyncio.run(work())
 
 
+def test_what_strangers_publish_does_no_more_than_be_read(broker: int) -> None:
+    """Rubbish is a missing value, a retained value is none, what is not asked for is not heard, a flood delays nobody."""
+    paho = pytest.importorskip("paho.mqtt.client")
+    stranger = paho.Client(paho.CallbackAPIVersion.VERSION2)
+    stranger.connect("127.0.0.1", broker)
+    stranger.loop_start()
+
+    def publish(topic: str, payload: bytes, **more: Any) -> None:
+        stranger.publish(topic, payload, **more).wait_for_publish(5.0)
+
+    async def work() -> None:
+        points = {"zone": ("own/t", CELSIUS), "set": ("own/set own/cmd", CELSIUS)}
+        publish("own/t", b"21.0", qos=1, retain=True)
+        link = MqttConnection(MqttLink(kind="mqtt", host="127.0.0.1", port=broker), points, Path())
+        await link.open()
+        try:
+            for _ in range(200):
+                publish("own/set", b"20", qos=1)
+                if not (await link.read(["set"], True))["set"]["error"]:
+                    break
+                await asyncio.sleep(0.02)
+            assert (await link.read(["zone"], True))["zone"]["error"] == "nothing was published lately"
+            for payload in (b"NaN", b"1e999", b'{"value": 1e400}', b"[" * 900, b"9" * 900, b"\xff" * 10, b"x" * 2000):
+                publish("own/t", payload, qos=1)
+                publish("own/t/x", b"21", qos=1)
+            await asyncio.sleep(0.1)
+            assert (await link.read(["zone"], True))["zone"] == {"value": None, "slots": None, "error": ""}
+            for _ in range(3000):
+                stranger.publish("own/t", b"21.0")
+            begin = time.monotonic()
+            assert await link.write("set", 293.15) == ""
+            await link.read(points, True)
+            assert time.monotonic() - begin < 1.0
+            assert set(link._seen) <= {"own/t", "own/set"}
+        finally:
+            await link.close()
+            publish("own/t", b"", retain=True)
+            stranger.disconnect()
+            stranger.loop_stop()
+
+    asyncio.run(work())
+
+
 def test_a_broker_that_is_not_there_is_an_answer() -> None:
     pytest.importorskip("paho.mqtt.client", reason="needs the extra [live]")
 

@@ -121,14 +121,26 @@ def test_a_result_is_not_written_to() -> None:
         (x + 1.0)[0] = 2.0
 
 
-def test_compiled_runs_are_the_same() -> None:
+@pytest.mark.parametrize(("dtype", "near"), [(np.float64, 1e-15), (np.float32, 1e-6)])
+def test_compiled_runs_are_the_same(dtype: Any, near: float) -> None:
+    """Parts of values are written, read and written again, in loops that are ordered anew."""
     pytest.importorskip("numba", reason="needs the extra [fast]")
     tape = Tape()
-    x, y = tape.value(3), tape.value()
-    result = tape.keep(equations(TracedOperations(tape), x, y), 3)
-    plain, compiled, rng = Program(tape, 4), Program(tape, 4, compiled=True), np.random.default_rng(1)
-    xs, ys = rng.uniform(0.0, 1.0, (3, 4)), rng.uniform(0.0, 1.0, 4)
-    for program in (plain, compiled):
-        program.of(x)[...], program.of(y)[...] = xs, ys
-        program.run()
-    np.testing.assert_allclose(compiled.of(result), plain.of(result), rtol=1e-15)
+    x, y, memory = tape.value(3), tape.value(), tape.value(3)
+    parts = tape.value(4, 3, kept=False)
+    parts[0], parts[1], parts[2], parts[3] = x, x * y, np.arctan(x), np.log(x + 1.0)
+    parts[1:3] = parts[1:3] * 2.0 - parts[0:2]
+    lines = np.stack([memory, parts[1], parts[2]])
+    turned = tape.call(lambda values, out: np.copyto(out, values[::-1]), [parts[3] + y**1.3], 3)
+    sloped = (lines[1:] - lines[:-1]) / (1.0 + np.expm1(lines[1:] * 0.1)) + np.power(parts[3], -0.3)
+    result = tape.keep(equations(TracedOperations(tape), x, y) + sloped.sum(axis=0) + turned, 3)
+    memory[1:] = memory[:-1] + result[1:] * 0.1
+    plain, compiled, rng = Program(tape, 4, dtype), Program(tape, 4, dtype, compiled=True), np.random.default_rng(1)
+    for _ in range(3):
+        xs, ys = rng.uniform(0.1, 1.0, (3, 4)), rng.uniform(0.1, 1.0, 4)
+        for program in (plain, compiled):
+            program.of(x)[...], program.of(y)[...] = xs, ys
+            program.run()
+        for value in (result, memory):
+            assert np.isfinite(plain.of(value)).all()
+            np.testing.assert_allclose(compiled.of(value), plain.of(value), rtol=near)

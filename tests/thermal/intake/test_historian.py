@@ -73,12 +73,13 @@ def test_means_held_values_and_gaps(historian: str, samples: dict[str, pd.Series
 def test_packed_days_are_the_same_and_late_samples_are_packed_again(historian: str) -> None:
     import psycopg
 
-    plain = read_historian(historian, START, END, 900.0, "late")
+    plain = {step: read_historian(historian, START, END, step, "late") for step in (180.0, 300.0, 900.0)}
     assert pack_days(historian, END, "late") == 3  # of four days in UTC that it touches, the last goes on
     assert pack_days(historian, END, "late") == 0
-    packed = read_historian(historian, START, END, 900.0, "late")
-    for name, series in plain.items():
-        assert packed[name].values.to_numpy() == pytest.approx(series.values.to_numpy(), nan_ok=True), name
+    for step, found in plain.items():  # of five minutes and more by slots
+        packed = read_historian(historian, START, END, step, "late")
+        for name, series in found.items():
+            assert packed[name].values.to_numpy() == pytest.approx(series.values.to_numpy(), nan_ok=True), name
     late = START + pd.Timedelta(minutes=620)
     with psycopg.connect(historian, autocommit=True) as connection:
         connection.execute(

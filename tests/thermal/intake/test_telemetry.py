@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -223,6 +224,19 @@ def test_a_row_of_an_impossible_year_among_good_ones_is_left_out_and_told(
     assert "1 rows without a time stamp that can be read were left out" in found.remarks
     lost = good.telemetry.frame[ROOM].notna() & found.telemetry.frame[ROOM].isna()
     assert lost.sum() == 3 and found.telemetry.frame.index.equals(good.telemetry.frame.index)
+
+
+@pytest.mark.parametrize("odd", ["20000-01-01", "-4400-03-15"])
+def test_times_of_a_parquet_file_that_pandas_cannot_spell_are_told(house: Path, tmp_path: Path, odd: str) -> None:
+    frame = table("5min", tz="UTC")
+    times = frame["time"].to_numpy("datetime64[ms]")
+    times[0] = np.datetime64(odd, "ms")
+    frame.assign(time=times).to_parquet(tmp_path / "t.parquet")
+    read = partial(import_telemetry, load_building(house), str(tmp_path / "t.parquet"))
+    told = " ".join(read(ImportSettings(timezone="UTC")).remarks)
+    assert f"1 rows are not time stamps of the years 1900 to 2199 (first {odd}" in told
+    with pytest.raises(PlanError, match=f"'{odd}"):
+        read(ImportSettings())
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """Jobs of the labelling page: work with progress, one piece after another, that can be stopped."""
 
+import os
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -83,12 +84,22 @@ class _Job:
 #: Who waits for whom: what the page itself does takes seconds, and does not wait for a report, which takes minutes.
 PAGE, REPORTS = "page", "reports"
 
+#: Reports made at a time, each in a process of one thread: a calibration and a diagnosis, where there are cores.
+AT_ONCE = min(2, os.cpu_count() or 1)
+
 
 class Jobs:
-    """The work of a page, done one piece after another on each of its lanes."""
+    """The work of a page, done one piece after another; reports side by side.
 
-    def __init__(self) -> None:
-        self._pools = {lane: ThreadPoolExecutor(max_workers=1, thread_name_prefix=lane) for lane in (PAGE, REPORTS)}
+    Parameters
+    ----------
+    at_once : int
+        Reports that are made at a time [-].
+    """
+
+    def __init__(self, at_once: int = AT_ONCE) -> None:
+        workers = {PAGE: 1, REPORTS: at_once}
+        self._pools = {lane: ThreadPoolExecutor(n, thread_name_prefix=lane) for lane, n in workers.items()}
         self._jobs: dict[int, _Job] = {}
         self._lock = Lock()
         self._count = 0

@@ -196,6 +196,8 @@ EDITS: list[tuple[dict[str, Any], str]] = [
      "zones.living.comfort: expected 'lower' and 'upper', or 'occupied' and 'unoccupied' with hours"),
     ({"actuators": {SPEED: {"signal": "oveHeaPumY_u", "kind": "modulating"}}}, "expected a minimum of a modulating"),
     ({"actuators": {SPEED: {"signal": "oveHeaPumY_u", "kind": "stepped"}}}, f"actuators.{SPEED}.kind"),
+    ({"actuators": {SETPOINT: {"signal": "oveTSet_u", "capacity": [["7 degC", 9000], ["-5 degC", 7000]]}}},
+     "expected a capacity over rising outdoor temperatures, found [280.15, 268.15] K"),
     ({"actuators": {SPEED: "oveHeaPumX_u"}}, "'oveHeaPumX_u'; the nearest valid one is 'oveHeaPumY_u'"),
     ({"zones": {"living": HOUSE | {"comfort": {"lower": 21, "upper": 24}}}},
      "zones.living.comfort: expected a lower and an upper temperature in K, found 21 to 24"),

@@ -290,7 +290,7 @@ def test_an_outline_keeps_every_extreme_and_every_gap() -> None:
 
 
 def test_reports_wait_for_each_other_and_the_page_waits_for_none(browser: Any) -> None:
-    jobs, begun = Jobs(), []
+    jobs, begun = Jobs(at_once=1), []
 
     def work(name: str) -> Callable[[Any], str]:
         def run(progress: Any) -> str:

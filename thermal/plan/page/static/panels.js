@@ -291,7 +291,7 @@ function problemsPanel() {
     el("button", { type: "button", onclick: () => showFinding(f) }, el("strong", {}, f.kind === "case" || f.kind === "site" ? f.kind : `${f.kind} ${f.name}`), el("span", {}, f.message)))));
   return [
     el("h2", {}, errors.length ? `${errors.length} to put right` : "This is a valid case"),
-    errors.length ? rows(errors) : el("p", {}, "It is in the case folder, and every command takes it as soon as there is telemetry."),
+    errors.length ? rows(errors) : el("p", {}, page.telemetry ? "It is in the case folder, and every command takes it." : "It is in the case folder, and every command takes it as soon as there is telemetry."),
     remarks.length > 0 && [el("h2", {}, `${remarks.length} worth a look`), rows(remarks)],
   ];
 }

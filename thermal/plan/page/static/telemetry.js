@@ -175,14 +175,17 @@ function casePart() {
   const check = now.check, taken = now.state?.taken;
   if (!check?.points.length) return now.working || now.state?.table ? null : el("p", { class: "soft pad" }, "The case has no telemetry yet.");
   const odd = new Set(check.anomalies.flatMap((a) => a.columns)), worst = check.anomalies.filter((a) => a.severity !== "remark");
+  const isOdd = (row) => odd.has(row.column) || Object.keys(row.flaws).length > 0, notes = check.anomalies.length - worst.length;
+  const points = [...check.points].sort((a, b) => isOdd(b) - isOdd(a));
+  const told = [worst.length ? `${worst.length} ${worst.length > 1 ? "findings are" : "finding is"} worth a look` : "", notes ? `${notes} ${notes > 1 ? "notes on single points stand" : "note on a single point stands"} first in the list below` : ""];
   const heard = taken?.file === page.telemetry ? [`from ${taken.where}${taken.left_out ? `, ${taken.left_out} columns left out` : ""}`, ...taken.remarks, ...(taken.unmatched_heat.length ? [`left out, though they tell of heat: ${taken.unmatched_heat.join(", ")}`] : [])] : [];
   const rowOf = (row) => el("tr", {}, nameCell(row, "case"), el("td", {}, spark(row)), el("td", {}, row.meaning), el("td", { class: "n" }, row.lowest === null ? "–" : `${short(row.lowest)} to ${short(row.highest)} ${row.unit}`),
-    el("td", { class: "n" }, `${Math.floor(1000 * row.usable_share) / 10} %`), el("td", { class: "soft" }, [...Object.entries(row.flaws).map(([kind, n]) => `${n} × ${kind}`), ...check.anomalies.filter((a) => a.columns.includes(row.column)).map((a) => a.kind)].join(", ")));
+    el("td", { class: "n" }, `${Math.floor(1000 * row.usable_share) / 10} %`), el("td", { class: "soft" }, [...Object.entries(row.flaws).map(([kind, n]) => `${n} × ${kind}`), ...check.anomalies.filter((a) => a.columns.includes(row.column)).map((a) => a.what)].join("; ")));
   return el("section", {},
     el("h3", {}, `In the case: ${check.points.length} points, ${check.start.slice(0, 10)} to ${check.end.slice(0, 10)}, every ${check.step / 60} minutes`),
-    el("p", { class: check.fit ? "" : "message", id: "telemetry-verdict" }, check.fit ? `Nothing speaks against a calibration${check.anomalies.length ? `; ${check.anomalies.length} findings are worth a look` : ""}.` : "A calibration makes no sense with this telemetry:"),
+    el("p", { class: check.fit ? "" : "message", id: "telemetry-verdict" }, check.fit ? `${["Nothing speaks against a calibration", ...told].filter(Boolean).join("; ")}.` : "A calibration makes no sense with this telemetry:"),
     worst.length > 0 && el("ul", { class: "findings" }, worst.slice(0, 40).map((a) => el("li", { class: a.severity === "error" ? "error" : "remark" }, el("button", { type: "button", onclick: () => a.columns[0] && pick(a.columns[0], "case") }, el("strong", {}, a.kind), el("span", {}, `${a.what} (${a.certainty}); ${a.advice}`))))),
     (heard.length > 0 || check.remarks.length > 0) && el("details", {}, el("summary", {}, `${heard.length + check.remarks.length} remarks`), el("ul", {}, [...heard, ...check.remarks].map((text) => el("li", {}, text)))),
     el("div", { class: "row" }, ["calibrate", "diagnose"].filter((kind) => page.reports.includes(kind)).map((kind) => el("button", { type: "button", id: `telemetry-${kind}`, class: now.state?.table && !isTaken() ? "" : "primary", disabled: now.working !== "" || !check.fit, onclick: async () => { await openReports(); await makeReport(kind); } }, `${kind === "calibrate" ? "Calibrate" : "Diagnose"} now`))),
-    rowsPart("case", check.points, [["all", "all points", () => true], ["odd", "with findings", (row) => odd.has(row.column) || Object.keys(row.flaws).length > 0]], ["point", "values", "what it is", "range", "usable", "found"], rowOf));
+    rowsPart("case", points, [["all", "all points", () => true], ["odd", "with findings", isOdd]], ["point", "values", "what it is", "range", "usable", "found"], rowOf));
 }

@@ -1,0 +1,86 @@
+"""What a controller of an identified plant reads from a forecast."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mpc.identify.model import PlantModel
+from mpc.identify.telemetry import CARRIERS, facade_sun
+from mpc.scenario.forecast import Forecast
+from thermal._types import FloatArray
+from thermal.case.building import Location
+from thermal.case.points import OUTDOOR_TEMPERATURE
+
+_PRICES = {"electricity": "electricity_price", "gas": "gas_price"}
+
+
+@dataclass(frozen=True, eq=False)
+class Ahead:
+    """What is expected over a horizon, one row a step.
+
+    Parameters
+    ----------
+    outdoor : ndarray, shape (N,)
+        Outdoor air [K].
+    sun : ndarray, shape (N, n_sun)
+        Irradiances [W/m2].
+    gain : ndarray, shape (N, n_zone)
+        Heat of people, and the constant one [W].
+    prices : ndarray, shape (N, n_carrier)
+        Of each of `CARRIERS` [currency/kWh].
+    lower, upper : ndarray, shape (N, n_zone)
+        Comfort bands [K].
+    occupied : ndarray of bool, shape (N, n_zone)
+        Whether people are expected.
+    """
+
+    outdoor: FloatArray
+    sun: FloatArray
+    gain: FloatArray
+    prices: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    occupied: np.ndarray
+
+    @classmethod
+    def of(cls, model: PlantModel, forecast: Forecast, location: Location) -> Ahead:
+        """Read a forecast.
+
+        Parameters
+        ----------
+        model : PlantModel
+            Whose zones and irradiances are wanted.
+        forecast : Forecast
+            Of the plant.
+        location : Location
+            Where it stands.
+        """
+        table, zones = forecast.table, model.box.zones
+
+        def of_zones(name: str) -> list[str]:
+            return [f"{zone}/{name}" for zone in zones]
+
+        edges = of_zones("comfort_lower_temperature"), of_zones("comfort_upper_temperature")
+        told = [name for name in (*of_zones("occupancy_count_sensor"), *of_zones("internal_gain"), *_PRICES.values())
+                if name in table]  # fmt: skip
+        names = [OUTDOOR_TEMPERATURE, *edges[0], *edges[1], *told]
+        known = dict(zip(names, forecast.values(names, fill="hold").T, strict=True))
+
+        def columns(wanted: list[str]) -> FloatArray:
+            return np.column_stack([known.get(name, np.zeros(len(table))) for name in wanted])
+
+        suns = facade_sun(location, model.step, table) if model.box.suns else {}
+        sun = (
+            np.column_stack([suns[name] for name in model.box.suns])
+            if suns
+            else np.zeros((len(table), len(model.box.suns)))
+        )
+        people = of_zones("occupancy_count_sensor")
+        occupied = columns(people) > 0.0 if people[0] in known else np.ones((len(table), len(zones)), dtype=bool)
+        return cls(
+            known[OUTDOOR_TEMPERATURE], np.nan_to_num(sun),
+            columns(of_zones("internal_gain")) + model.box.parts["constant gain"],
+            columns([_PRICES.get(carrier, "") for carrier in CARRIERS]), columns(edges[0]), columns(edges[1]), occupied,
+        )  # fmt: skip

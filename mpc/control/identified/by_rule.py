@@ -1,0 +1,121 @@
+"""What the rule would do from here, by the same model: the comparison that a plan's saving is told by."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibration.estimation.state_space import REFERENCE
+from calibration.grey_box.network import COP_AT, COP_PER
+from mpc.baselines.plants import DIFFERENCE, LEAD
+from mpc.control.identified.ahead import Ahead
+from mpc.control.identified.problem import IdentifiedProblem
+from mpc.identify.telemetry import CARRIERS
+from mpc.scenario.rates import KILOWATT_HOUR
+from thermal._types import FloatArray
+
+
+@dataclass(frozen=True)
+class RuleEstimate:
+    """Cost of a plan and of the rule over the same horizon.
+
+    Parameters
+    ----------
+    plan, rule : float
+        Bought over the horizon [currency].
+    stored : float
+        Heat that the plan leaves in the building beyond what the rule leaves, at what the rule's heat costs [currency];
+        negative where the plan ends colder.
+    """
+
+    plan: float
+    rule: float
+    stored: float
+
+    @property
+    def saving(self) -> float:
+        """Share of the rule's cost that the plan saves, what it leaves in the building included [-]; 0 without cost."""
+        return (self.rule - self.plan + self.stored) / self.rule if self.rule > 0.0 else 0.0
+
+
+def estimate_rule(
+    problem: IdentifiedProblem, ahead: Ahead, parameters: FloatArray, planned: tuple[FloatArray, FloatArray],
+    most: FloatArray, on: FloatArray,
+) -> RuleEstimate:  # fmt: skip
+    """Let the rule of `mpc.baselines.plants.FullSpeed` run on the model from where a plan begins, and compare.
+
+    Parameters
+    ----------
+    problem : IdentifiedProblem
+        Of the model.
+    ahead : Ahead
+        Of the horizon.
+    parameters : ndarray, shape (N, l)
+        Of `IdentifiedProblem.data`, with ends from 0 to 1.
+    planned : tuple of ndarray, shape (N + 1, n) and (N, m)
+        States [K less the reference] and levels [-] of the plan.
+    most : ndarray, shape (N, m)
+        Largest levels [-].
+    on : ndarray of bool, shape (m,)
+        Machines that run now.
+
+    Returns
+    -------
+    RuleEstimate
+        By the model alone: its errors are those of both costs.
+    """
+    states, levels = planned
+    by_rule = _rule(problem, ahead, parameters, (states[0], most, on))
+    cost, heat = _bought(problem, ahead, *by_rule)
+    left = float(problem.model.box.capacity @ (states[-1] - by_rule[0][-1]))
+    stored = left * cost / heat if heat > 0.0 else 0.0
+    return RuleEstimate(_bought(problem, ahead, states, levels)[0], cost, stored)
+
+
+def _rule(
+    problem: IdentifiedProblem, ahead: Ahead, parameters: FloatArray, start: tuple[FloatArray, FloatArray, FloatArray]
+) -> tuple[FloatArray, FloatArray]:
+    """States and levels of the rule."""
+    model, step = problem.model, problem.stage.step
+    zones, count = model.box.zones, len(ahead.outdoor)
+    served = [np.array([zone in found.machine.serves for zone in zones], dtype=bool) for found in model.maps]
+    near = max(round(LEAD / model.step), 1)
+    state, most, runs = start[0], start[1], start[2].astype(bool).copy()
+    states, levels = np.empty((count + 1, state.size)), np.zeros((count, len(served)))
+    states[0] = state
+    for n in range(count):
+        edges = ahead.lower[n : n + near].max(axis=0) - REFERENCE
+        rest = np.array(step(state, np.zeros(len(served)), parameters[n])[0]).ravel()
+        for k, (found, mine) in enumerate(zip(model.maps, served, strict=True)):
+            edge = float(edges[mine].max())
+            if found.operation == "setpoint":
+                full = np.eye(len(served))[k]
+                gained = np.array(step(state, full, parameters[n])[0]).ravel() - rest
+                idle, wide = found.above[0], found.above[1] - found.above[0]
+                rise = float(gained[: len(zones)][mine].mean()) + wide
+                missing = edge - idle - float(rest[: len(zones)][mine].mean())
+                levels[n, k] = np.clip(missing / rise, 0.0, most[n, k]) if rise > 0.0 else 0.0
+                continue
+            above = float(state[: len(zones)][mine].min()) - edge
+            runs[k] = above < 0.0 or (runs[k] and above <= DIFFERENCE)
+            levels[n, k] = most[n, k] * runs[k]
+        state = np.array(step(state, levels[n], parameters[n])[0]).ravel()
+        states[n + 1] = state
+    return states, levels
+
+
+def _bought(problem: IdentifiedProblem, ahead: Ahead, states: FloatArray, levels: FloatArray) -> tuple[float, float]:
+    """Cost [currency] and heat [J] of levels along states."""
+    model = problem.model
+    emitter = REFERENCE + states[:-1] @ model.box.emitter_weights
+    cost, heat = 0.0, 0.0
+    for carrier, base in model.base.items():
+        cost += float(base * ahead.prices[:, CARRIERS.index(carrier)].sum())
+    for k, found in enumerate(model.maps):
+        slope = 1.0 + float(model.box.slopes[k]) * (ahead.outdoor - COP_AT) / COP_PER
+        heat += float((found.at(found.heat, levels[:, k], ahead.outdoor, emitter[:, k]) * slope).sum())
+        for carrier, curve in found.powers.items():
+            power = found.at(curve, levels[:, k], ahead.outdoor, emitter[:, k])
+            cost += float(np.asarray(power * ahead.prices[:, CARRIERS.index(carrier)]).sum())
+    return cost * model.step / KILOWATT_HOUR, heat * model.step
