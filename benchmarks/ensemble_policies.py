@@ -11,8 +11,8 @@ the same recipe, steps and weeks, on as many plants at once as there are members
 
 No policy is chosen by what it does: the last one counts. The judge is the stage cost of a week of the office.
 
-Run: ``python benchmarks/ensemble_policies.py --out results/ensemble [--seeds 0 1 2 3 4] [--publish]``. A policy or a
-run that is there is not made again. Writes ``ensemble_policies.json`` and ``.md``.
+Run: ``python benchmarks/ensemble_policies.py --out results/ensemble [--seeds 0 1 2 3 4] [--publish]``, a CPU minute a
+policy. A policy or a run that is there is not made again. Writes ``ensemble_policies.json`` and ``.md``.
 """
 
 from __future__ import annotations
@@ -161,8 +161,8 @@ def main() -> None:
     told = [dict(ActorNetwork.load(path).about) for path in sorted(options.out.glob("*.npz"))]
     cpu = float(np.mean([one["cpu_seconds"] for one in told]))
     note = (
-        f"{told[0]['steps']:,} control steps of a quarter of an hour a policy, {MEMBERS} members, {cpu:.0f} s of CPU; "
-        f"{MODELS} models in the ensemble, parameters drawn by their standard errors. Load average "
+        f"PPO, {told[0]['steps']:,} control steps of a quarter of an hour and {cpu:.0f} s of CPU a policy, {MEMBERS} "
+        f"members; {MODELS} models in the ensemble, drawn by the standard errors of their parameters. Load average "
         f"{os.getloadavg()[0]:.1f}.\n"
     )
     table = markdown(columns, found)
