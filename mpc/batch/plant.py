@@ -47,8 +47,8 @@ class BatchedPlant:
     Raises
     ------
     PlantError
-        When plants do not fit each other, are stepped on the grid, have thermostats that remember, emitters that
-        radiate, or effects whose signals are known only while they run.
+        Plants do not fit each other, are on the grid, or have thermostats that remember, emitters that radiate, or
+        effects whose signals are known only while they run.
 
     Examples
     --------
@@ -134,9 +134,7 @@ class BatchedPlant:
     def _set(self, name: str) -> Array:
         return self._program.of(getattr(self._traced.inputs, name))
 
-    def reset(
-        self, seeds: ArrayLike, plants: ArrayLike | None = None, members: ArrayLike | None = None
-    ) -> Array:
+    def reset(self, seeds: ArrayLike, plants: ArrayLike | None = None, members: ArrayLike | None = None) -> Array:
         """Start members anew, after the warm-up of their plants.
 
         Parameters
