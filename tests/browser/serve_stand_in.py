@@ -58,7 +58,7 @@ def main() -> None:
     building = pilot_building(1, floor_area=600.0, zones=12, floors=1)
     save_plan_case(building, folder / "case")
     export(list(building.zone_names), folder / "export.csv")
-    makers = {"calibrate": stand_in(20.0, "calibration"), "diagnose": stand_in(0.4, "diagnosis")}
+    makers = {"calibrate": stand_in(30.0, "calibration"), "diagnose": stand_in(0.4, "diagnosis")}
     desk = LabelDesk(folder / "case", makers=makers)
     serve_page(desk, ready=lambda address: sys.stdout.write(f"{address}\n") and sys.stdout.flush())
 

@@ -14,6 +14,7 @@ from calibration.fit.fitted_case import FittedCase, fit_case
 from calibration.fit.result import CalibrationResult
 from mpc.reports.calibration import calibration_verdict
 from thermal.case.case import Case
+from thermal.case.telemetry import Telemetry
 from thermal.data import load_bundled_case
 
 QUICK = {"dx": 1.0, "starts": 1}
@@ -21,7 +22,10 @@ QUICK = {"dx": 1.0, "starts": 1}
 
 @pytest.fixture(scope="module")
 def case() -> Case:
-    return load_bundled_case()
+    """The bundled case in quarters of an hour, which are fitted in half the time."""
+    found = load_bundled_case()
+    frame = found.telemetry.frame.resample("15min", closed="right", label="right").mean()
+    return replace(found, telemetry=Telemetry.from_frame(frame), judged=None)
 
 
 @pytest.fixture(scope="module")
