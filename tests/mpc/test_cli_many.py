@@ -26,8 +26,10 @@ from calibration import calibrate
 from mpc.cli.app import app
 from thermal.pilot.building import PilotSettings, generate_pilot
 
-OPTIONS = ("--horizon", "1h", "--starts", "1")
+OPTIONS = ("--horizon", "1h", "--starts", "1", "--structure", "drawn")
 NAMES = [f"office {k}" for k in range(3)]
+
+pytestmark = pytest.mark.usefixtures("blank_pictures")
 
 
 def run(*arguments: str | Path) -> Any:
@@ -131,7 +133,7 @@ def test_a_run_that_is_killed_or_interrupted_goes_on(cases: Path, tmp_path: Path
     for text in ("Held-out error 1h ahead", "office 1", "calibrated, done before", f"Report: {out / 'report.html'}"):
         assert text in answer.stdout
     assert run("priors", out, "--out", tmp_path / "taught").exit_code == 0
-    options = ("--priors", tmp_path / "taught" / "priors.json", "--structure", "drawn", *OPTIONS)
+    options = ("--priors", tmp_path / "taught" / "priors.json", *OPTIONS)
     answer = run("calibrate", cases / NAMES[0], "--out", tmp_path / "new", *options, "--json")
     alone = json.loads((out / NAMES[0] / "calibration.json").read_text(encoding="utf-8"))["parameters"]
     taught = json.loads(answer.stdout)["parameters"]

@@ -16,19 +16,19 @@ from calibration.errors import ResultsExistError
 from mpc.cli.app import app
 from mpc.errors import ControlError
 from mpc.studies.demo import Demo, _working_day, run_demo
-from thermal import Case, load_bundled_case
+from thermal import Case, load_case
 
 STEPS = ["check", "calibrate", "diagnose", "evaluate", "compare"]
 
 
 @pytest.fixture(scope="module")
-def case() -> Case:
+def case(coarse_case: Path) -> Case:
     """The bundled case, whose building has sun through its windows."""
-    return load_bundled_case()
+    return load_case(coarse_case)
 
 
 @pytest.fixture(scope="module")
-def demo(case: Case, tmp_path_factory: pytest.TempPathFactory) -> tuple[Demo, list[str]]:
+def demo(case: Case, blank_pictures: None, tmp_path_factory: pytest.TempPathFactory) -> tuple[Demo, list[str]]:
     """Of two controllers and one hour."""
     said: list[str] = []
     with pytest.MonkeyPatch.context() as patch:
