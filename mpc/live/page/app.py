@@ -16,6 +16,7 @@ from mpc.live.page.access import Access, Role, page_tokens
 from mpc.live.page.metrics import metrics
 from mpc.live.site import Site
 from mpc.live.state import read_state
+from mpc.reports.units import inch_pound
 from thermal.plan.guard import extra
 
 #: Longest body of a request [bytes], time between two events of the stream [s], and most streams at a time.
@@ -42,7 +43,9 @@ def make_app(site: Site) -> Any:
     access, key = Access(site.file.page.host, page_tokens(site.folder)), operator_key(site.folder)
     style = resources.files("mpc.reports").joinpath("templates/style.css").read_text(encoding="utf-8")
     page = resources.files("mpc.live.page").joinpath("page.html").read_text(encoding="utf-8")
+    units = {unit: line._asdict() for unit in ("°C", "K") if (line := inch_pound(unit))}
     page = page.replace("/* style of all reports */", style)
+    page = page.replace("{/* inch-pound units */}", json.dumps(units, ensure_ascii=False))
     app = fastapi.FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     streams, seen = [0], _Fresh(site)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import re
 import socket
 import threading
 import time
@@ -102,6 +103,13 @@ def test_the_page_is_shown_to_its_own_machine_alone(site: Site, box: Mailbox) ->
                                                             "waiting": False, "missing": 0}))  # fmt: skip
     assert page.get("/health").json() == {"fine": True, "guard": "up"}
     assert page.get("/docs").status_code == page.get("/openapi.json").status_code == 404
+
+
+def test_the_page_has_the_units_that_it_can_turn_to(site: Site) -> None:
+    found = re.search(r"const inchPound = (\{.*?\}\});", client(site).get("/").text)
+    assert found is not None
+    units = json.loads(found[1])
+    assert units == {"°C": {"scale": 1.8, "offset": 32.0, "unit": "°F"}, "K": {"scale": 1.8, "offset": 0.0, "unit": "°F"}}
 
 
 def test_without_a_guard_nothing_is_claimed(site: Site) -> None:
