@@ -10,6 +10,7 @@ from calibration.estimation.state_space import REFERENCE
 from calibration.grey_box.network import COP_AT, COP_PER
 from mpc.baselines.plants import DIFFERENCE, LEAD
 from mpc.control.identified.ahead import Ahead
+from mpc.control.identified.beyond import beyond, carrier_of
 from mpc.control.identified.problem import IdentifiedProblem
 from mpc.identify.telemetry import CARRIERS
 from mpc.scenario.rates import KILOWATT_HOUR
@@ -117,5 +118,7 @@ def _bought(problem: IdentifiedProblem, ahead: Ahead, states: FloatArray, levels
         heat += float((found.at(found.heat, levels[:, k], ahead.outdoor, emitter[:, k]) * slope).sum())
         for carrier, curve in found.powers.items():
             power = found.at(curve, levels[:, k], ahead.outdoor, emitter[:, k])
+            if found.own is not None and carrier == carrier_of(found):
+                power = power + beyond(ahead.beyond[:, k].T, levels[:, k])
             cost += float(np.asarray(power * ahead.prices[:, CARRIERS.index(carrier)]).sum())
     return cost * model.step / KILOWATT_HOUR, heat * model.step

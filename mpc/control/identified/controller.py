@@ -12,6 +12,7 @@ import pandas as pd
 
 from calibration.estimation.state_space import REFERENCE
 from mpc.control.identified.ahead import Ahead
+from mpc.control.identified.beyond import PowerLearner, beyond, carrier_of
 from mpc.control.identified.by_rule import RuleEstimate, estimate_rule
 from mpc.control.identified.conformal import AFTER, ConformalBackOff, Guarantee, risen
 from mpc.control.identified.electric import Electric, ElectricNow
@@ -161,7 +162,7 @@ class IdentifiedController:
         self._plan: StageSolution | None = None
         self._most = max(_AT_ONCE * self.settings.starts, 1.0)
         self._runs = [_Runs(self._most) for _ in model.maps]
-        self._thermostats = Thermostats(model)
+        self._thermostats, self._learner = Thermostats(model), PowerLearner(model)
         self._hold = max(round(self.settings.run / model.step), 1)
         self._back = max(self.settings.starts - self._most, 0.0) * model.step / 86_400.0
         asked = self.settings.guarantee
@@ -198,6 +199,7 @@ class IdentifiedController:
         begin = time.perf_counter()
         ahead = Ahead.of(self.model, forecast, self._location)
         self._observe(measurements, ahead)
+        ahead = replace(ahead, beyond=self._learner.along(ahead.outdoor, self._thermostats.most(ahead.outdoor)))
         if self._solver is None or self._solver.n_steps != len(ahead.outdoor):
             self._solver = StageSolver(self._problem.stage, len(ahead.outdoor), tolerance=self._tolerance)
             self._plan = None
@@ -235,6 +237,7 @@ class IdentifiedController:
         before, levels = self._before
         outdoor = self._observer.outdoor(measurements, before)
         self._thermostats.learn(measurements, self._observer.zones(measurements), outdoor)
+        self._learner.learn(measurements, levels, outdoor, self._observer.state)
         self._observer.update(measurements, before, levels)
         if self.conformal is not None:
             realised = self._inside(self._observer.zones(measurements) - REFERENCE, before)
@@ -382,6 +385,9 @@ class IdentifiedController:
             powers[:, int(carrier != "electricity")] += base
         for k, found in enumerate(self.model.maps):
             for carrier, curve in found.powers.items():
-                value: Any = found.at(curve, solution.decisions[:, k], ahead.outdoor, emitter[:, k])
+                level = solution.decisions[:, k]
+                value: Any = found.at(curve, level, ahead.outdoor, emitter[:, k])
+                if found.own is not None and carrier == carrier_of(found):
+                    value = value + beyond(ahead.beyond[:, k].T, level)
                 powers[:, int(carrier != "electricity")] += value
         return powers

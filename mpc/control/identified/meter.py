@@ -8,6 +8,7 @@ import numpy as np
 
 from calibration.estimation.state_space import REFERENCE
 from mpc.control.identified.ahead import Ahead
+from mpc.control.identified.beyond import beyond, carrier_of
 from mpc.control.identified.electric import Electric, ElectricNow
 from mpc.identify.model import PlantModel
 from mpc.identify.telemetry import CARRIERS
@@ -81,6 +82,8 @@ class ElectricMeter:
         for k, found in enumerate(self.model.maps):
             if CARRIERS[0] in found.powers:
                 self._modelled[k] = found.at(found.powers[CARRIERS[0]], levels[k], outdoor, emitter[k])
+                if found.own is not None and carrier_of(found) == CARRIERS[0]:
+                    self._modelled[k] += beyond(ahead.beyond[0, k], levels[k])
         power = 0.0 if self.electric.battery is None else self.electric.battery.power
         base = self.model.base.get(CARRIERS[0], 0.0)
         self._net = base + power * values.get(self.electric.command, 0.0) - self._generation
