@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.estimation.state_space import REFERENCE
-from calibration.grey_box.network import COP_AT, COP_PER
 from mpc.baselines.plants import DIFFERENCE, LEAD
 from mpc.control.identified.ahead import Ahead
 from mpc.control.identified.beyond import beyond, carrier_of
@@ -77,9 +76,12 @@ def estimate_rule(
 def _rule(
     problem: IdentifiedProblem, ahead: Ahead, parameters: FloatArray, start: tuple[FloatArray, FloatArray, FloatArray]
 ) -> tuple[FloatArray, FloatArray]:
-    """States and levels of the rule."""
-    model, step = problem.model, problem.stage.step
-    zones, count = model.box.zones, len(ahead.outdoor)
+    """States and levels of the rule, by the matrices of the model: symbols would take most of a controller's time."""
+    model, zones, count = problem.model, problem.model.box.zones, len(ahead.outdoor)
+    (transition, drive), m = problem.matrices, len(model.maps)
+    first = 1 + len(model.box.suns)  # of the inputs: outdoor air, suns, heat of the machines, gains
+    heated, others = drive[:, first : first + m], np.delete(drive, np.s_[first : first + m], axis=1)
+    exogenous = np.column_stack([parameters[:, :1] - REFERENCE, parameters[:, 1 : first + len(zones)]]) @ others.T
     served = [np.array([zone in found.machine.serves for zone in zones], dtype=bool) for found in model.maps]
     near = max(round(LEAD / model.step), 1)
     state, most, runs = start[0], start[1], start[2].astype(bool).copy()
@@ -87,12 +89,12 @@ def _rule(
     states[0] = state
     for n in range(count):
         edges = ahead.lower[n : n + near].max(axis=0) - REFERENCE
-        rest = np.array(step(state, np.zeros(len(served)), parameters[n])[0]).ravel()
+        rest = transition @ state + exogenous[n]
+        emitter = REFERENCE + state @ model.box.emitter_weights
         for k, (found, mine) in enumerate(zip(model.maps, served, strict=True)):
             edge = float(edges[mine].max())
             if found.operation == "setpoint":
-                full = np.eye(len(served))[k]
-                gained = np.array(step(state, full, parameters[n])[0]).ravel() - rest
+                gained = heated[:, k] * problem.heat(k, 1.0, ahead.outdoor[n], emitter[k])
                 idle, wide = found.above[0], found.above[1] - found.above[0]
                 rise = float(gained[: len(zones)][mine].mean()) + wide
                 missing = edge - idle - float(rest[: len(zones)][mine].mean())
@@ -101,7 +103,8 @@ def _rule(
             above = float(state[: len(zones)][mine].min()) - edge
             runs[k] = above < 0.0 or (runs[k] and above <= DIFFERENCE)
             levels[n, k] = most[n, k] * runs[k]
-        state = np.array(step(state, levels[n], parameters[n])[0]).ravel()
+        heat = [problem.heat(k, levels[n, k], ahead.outdoor[n], emitter[k]) for k in range(m)]
+        state = rest + heated @ np.array(heat)
         states[n + 1] = state
     return states, levels
 
@@ -114,8 +117,7 @@ def _bought(problem: IdentifiedProblem, ahead: Ahead, states: FloatArray, levels
     for carrier, base in model.base.items():
         cost += float(base * ahead.prices[:, CARRIERS.index(carrier)].sum())
     for k, found in enumerate(model.maps):
-        slope = 1.0 + float(model.box.slopes[k]) * (ahead.outdoor - COP_AT) / COP_PER
-        heat += float((found.at(found.heat, levels[:, k], ahead.outdoor, emitter[:, k]) * slope).sum())
+        heat += float(np.asarray(problem.heat(k, levels[:, k], ahead.outdoor, emitter[:, k])).sum())
         for carrier, curve in found.powers.items():
             power = found.at(curve, levels[:, k], ahead.outdoor, emitter[:, k])
             if found.own is not None and carrier == carrier_of(found):

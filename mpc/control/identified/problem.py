@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -82,13 +83,31 @@ class IdentifiedProblem:
         return {added.electric.command: added.command(decisions[len(self.model.maps) :])}
 
     @cached_property
-    def _space(self):  # type: ignore[no-untyped-def]
-        return self.model.box.space(self.model.step)
+    def matrices(self) -> tuple[FloatArray, FloatArray]:
+        """A and B."""
+        space = self.model.box.space(self.model.step)
+        return space.transition, space.drive
+
+    def heat(self, k: int, load: Any, outdoor: Any, emitter: Any) -> Any:
+        """Heat of a machine that arrives, with numbers, arrays or symbols [W].
+
+        Parameters
+        ----------
+        k : int
+            Which machine.
+        load : number, array or symbol
+            Duty or load [-].
+        outdoor, emitter : number, array or symbol
+            Temperatures [K].
+        """
+        found = self.model.maps[k]
+        slope = 1.0 + float(self.model.box.slopes[k]) * (outdoor - COP_AT) / COP_PER
+        return found.at(found.heat, load, outdoor, emitter) * slope
 
     @cached_property
     def stage(self) -> StageProblem:
         """The problem of a step."""
-        model, box, space = self.model, self.model.box, self._space
+        model, box = self.model, self.model.box
         nz, ns, m = len(box.zones), len(box.suns), len(model.maps)
         x, u, sizes = ca.SX.sym("x", 4 * nz), ca.SX.sym("u", m), [1, ns, nz, len(CARRIERS), m, m, m * WEIGHTS]
         p, added = ca.SX.sym("p", sum(sizes)), self._added
@@ -97,8 +116,7 @@ class IdentifiedProblem:
         emitter = REFERENCE + ca.mtimes(ca.DM(box.emitter_weights.T), x)
         heats, cost, electricity = [], ca.SX(0), ca.SX(model.base.get(CARRIERS[0], 0.0))
         for k, found in enumerate(model.maps):
-            slope = 1.0 + float(box.slopes[k]) * (outdoor - COP_AT) / COP_PER
-            heats.append(found.at(found.heat, chosen[k], outdoor, emitter[k]) * slope)
+            heats.append(self.heat(k, chosen[k], outdoor, emitter[k]))
             for carrier, curve in found.powers.items():
                 power = found.at(curve, chosen[k], outdoor, emitter[k])
                 if found.own is not None and carrier == carrier_of(found):
@@ -108,7 +126,8 @@ class IdentifiedProblem:
                 else:
                     cost += price[CARRIERS.index(carrier)] * power
         inputs = ca.vertcat(outdoor - REFERENCE, sun, *heats, gain)
-        following = ca.mtimes(ca.DM(space.transition), x) + ca.mtimes(ca.DM(space.drive), inputs)
+        transition, drive = self.matrices
+        following = ca.mtimes(ca.DM(transition), x) + ca.mtimes(ca.DM(drive), inputs)
         cost, end, banded = cost * model.step / KILOWATT_HOUR, ca.SX(0), x[:nz]
         if added is not None:
             after, paid = added.following(electricity, price[0])
