@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -99,8 +100,8 @@ class PlannedAction(dict[str, float]):
     zone, power : ndarray
         Expected at the edges of the steps, shape (N + 1, n_zone) [K], and electricity and other carriers over them,
         shape (N, 2) [W].
-    rule : RuleEstimate or None
-        What the plan and the rule cost over the horizon; None where electricity is decided too.
+    compare : callable or None
+        Makes `rule`; None where electricity is decided too.
     """
 
     def __init__(self, values: Mapping[str, float], stamp: pd.Timestamp, source: str, reasons: tuple[str, ...]) -> None:
@@ -110,7 +111,12 @@ class PlannedAction(dict[str, float]):
         self.solution: StageSolution | None = None
         self.zone: FloatArray = np.empty((0, 0))
         self.power: FloatArray = np.empty((0, 2))
-        self.rule: RuleEstimate | None = None
+        self.compare: Callable[[], RuleEstimate] | None = None
+
+    @cached_property
+    def rule(self) -> RuleEstimate | None:
+        """What the plan and the rule cost over the horizon, made when it is asked for."""
+        return None if self.compare is None else self.compare()
 
 
 class IdentifiedController:
@@ -226,7 +232,7 @@ class IdentifiedController:
             action.solution = solution
             action.zone = solution.states[:, : len(self.model.box.zones)] + REFERENCE
             action.power = self._powers(solution, ahead)
-            action.rule = self._compared(solution, ahead, on) if self._meter is None else None
+            action.compare = self._compared(solution, ahead, on) if self._meter is None else None
         return action
 
     def _observe(self, measurements: Measurements, ahead: Ahead) -> None:
@@ -370,12 +376,13 @@ class IdentifiedController:
             return actuator.minimum if value > 0.5 * (low + actuator.minimum) else low
         return float(np.clip(value, low, high))
 
-    def _compared(self, solution: StageSolution, ahead: Ahead, on: FloatArray) -> RuleEstimate:
-        """Hold a plan against the rule on the same model."""
+    def _compared(self, solution: StageSolution, ahead: Ahead, on: FloatArray) -> Callable[[], RuleEstimate]:
+        """Give what holds a plan against the rule on the same model."""
         most = self._thermostats.most(ahead.outdoor)
         free = np.zeros_like(most), np.ones_like(most)
         data = self._problem.data(self._observer.state, ahead, self._kept, self.settings.comfort_price, free)
-        return estimate_rule(self._problem, ahead, data.parameters, (solution.states, solution.decisions), most, on)
+        planned = solution.states, solution.decisions
+        return partial(estimate_rule, self._problem, ahead, data.parameters, planned, most, on)
 
     def _powers(self, solution: StageSolution, ahead: Ahead) -> FloatArray:
         """Give expected electricity and other carriers, shape (N, 2) [W]."""
