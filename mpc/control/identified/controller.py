@@ -205,6 +205,7 @@ class IdentifiedController:
         begin = time.perf_counter()
         ahead = Ahead.of(self.model, forecast, self._location)
         self._observe(measurements, ahead)
+        self._thermostats.expect(ahead.outdoor)
         ahead = replace(ahead, beyond=self._learner.along(ahead.outdoor, self._thermostats.most(ahead.outdoor)))
         if self._solver is None or self._solver.n_steps != len(ahead.outdoor):
             self._solver = StageSolver(self._problem.stage, len(ahead.outdoor), tolerance=self._tolerance)
