@@ -107,7 +107,7 @@ class HeatLimit:
         return (_SHEET_LEVEL, 0.0, _SHEET_SHAPE) if self.sheet else (_LEVEL, _SLOPE, _SHAPE)
 
     def _near(self, outdoor: FloatArray, error: FloatArray | float) -> FloatArray:
-        """Give the loads that are as likely as each other within the error of outdoor temperatures, shape (5, n) [-]."""
+        """Give loads that are equally likely within the error of outdoor temperatures, shape (5, n) [-]."""
         return self._mean(outdoor + _FIFTHS[:, None] * np.asarray(error))
 
     def _mean(self, outdoor: FloatArray) -> FloatArray:

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from calibration.estimation.state_space import REFERENCE
 from mpc.identify.corrections import PowerCorrection
 from mpc.identify.maps import EMITTER, MachineMap
 from mpc.identify.model import PlantModel
@@ -51,6 +50,28 @@ def beyond(weights: Any, load: Any) -> Any:
     return power
 
 
+def bought(
+    model: PlantModel, weights: FloatArray, states: FloatArray, levels: FloatArray, outdoor: FloatArray | float
+) -> FloatArray:
+    """Power that each machine buys with what is beyond its map, shape (..., n_machine, n_carrier) [W].
+
+    Parameters
+    ----------
+    model : PlantModel
+        Identified.
+    weights : ndarray, shape (..., n_machine, `WEIGHTS`)
+        See `weights_of` [W].
+    states, levels, outdoor : ndarray
+        As of `PlantModel.bought` [K less the reference], [-] and [K].
+    """
+    powers = model.bought(states, levels, outdoor)
+    for k, found in enumerate(model.maps):
+        if found.own is not None:
+            power = beyond(np.moveaxis(weights[..., k, :], -1, 0), levels[..., k])
+            powers[..., k, CARRIERS.index(carrier_of(found))] += power
+    return powers
+
+
 class PowerLearner:
     """Corrects the power of machines that have a sensor of it, step by step.
 
@@ -78,8 +99,7 @@ class PowerLearner:
         state : ndarray
             Of the observer at its start [K and W].
         """
-        box = self._model.box
-        emitter = REFERENCE + state[: box.capacity.size] @ box.emitter_weights
+        emitter = self._model.box.emitter(state)
         for k, (found, correction) in enumerate(zip(self._model.maps, self._corrections, strict=True)):
             machine, load = found.machine, float(levels[k])
             if found.own is None or machine.power not in measurements:

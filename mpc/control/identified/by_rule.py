@@ -9,9 +9,8 @@ import numpy as np
 from calibration.estimation.state_space import REFERENCE
 from mpc.baselines.plants import DIFFERENCE, LEAD
 from mpc.control.identified.ahead import Ahead
-from mpc.control.identified.beyond import beyond, carrier_of
+from mpc.control.identified.beyond import bought
 from mpc.control.identified.problem import IdentifiedProblem
-from mpc.identify.telemetry import CARRIERS
 from mpc.scenario.rates import KILOWATT_HOUR
 from thermal._types import FloatArray
 
@@ -77,12 +76,11 @@ def _rule(
     problem: IdentifiedProblem, ahead: Ahead, parameters: FloatArray, start: tuple[FloatArray, FloatArray, FloatArray]
 ) -> tuple[FloatArray, FloatArray]:
     """States and levels of the rule, by the matrices of the model: symbols would take most of a controller's time."""
-    model, zones, count = problem.model, problem.model.box.zones, len(ahead.outdoor)
+    model, zones, count, served = problem.model, problem.model.box.zones, len(ahead.outdoor), problem.model.box.serves
     (transition, drive), m = problem.matrices, len(model.maps)
     first = 1 + len(model.box.suns)  # of the inputs: outdoor air, suns, heat of the machines, gains
     heated, others = drive[:, first : first + m], np.delete(drive, np.s_[first : first + m], axis=1)
     exogenous = np.column_stack([parameters[:, :1] - REFERENCE, parameters[:, 1 : first + len(zones)]]) @ others.T
-    served = [np.array([zone in found.machine.serves for zone in zones], dtype=bool) for found in model.maps]
     near = max(round(LEAD / model.step), 1)
     state, most, runs = start[0], start[1], start[2].astype(bool).copy()
     states, levels = np.empty((count + 1, state.size)), np.zeros((count, len(served)))
@@ -90,7 +88,7 @@ def _rule(
     for n in range(count):
         edges = ahead.lower[n : n + near].max(axis=0) - REFERENCE
         rest = transition @ state + exogenous[n]
-        emitter = REFERENCE + state @ model.box.emitter_weights
+        emitter = model.box.emitter(state)
         for k, (found, mine) in enumerate(zip(model.maps, served, strict=True)):
             edge = float(edges[mine].max())
             if found.operation == "setpoint":
@@ -112,15 +110,6 @@ def _rule(
 def _bought(problem: IdentifiedProblem, ahead: Ahead, states: FloatArray, levels: FloatArray) -> tuple[float, float]:
     """Cost [currency] and heat [J] of levels along states."""
     model = problem.model
-    emitter = REFERENCE + states[:-1] @ model.box.emitter_weights
-    cost, heat = 0.0, 0.0
-    for carrier, base in model.base.items():
-        cost += float(base * ahead.prices[:, CARRIERS.index(carrier)].sum())
-    for k, found in enumerate(model.maps):
-        heat += float(np.asarray(problem.heat(k, levels[:, k], ahead.outdoor, emitter[:, k])).sum())
-        for carrier, curve in found.powers.items():
-            power = found.at(curve, levels[:, k], ahead.outdoor, emitter[:, k])
-            if found.own is not None and carrier == carrier_of(found):
-                power = power + beyond(ahead.beyond[:, k].T, levels[:, k])
-            cost += float(np.asarray(power * ahead.prices[:, CARRIERS.index(carrier)]).sum())
-    return cost * model.step / KILOWATT_HOUR, heat * model.step
+    powers = bought(model, ahead.beyond, states[:-1], levels, ahead.outdoor).sum(axis=1) + model.bought_anyway
+    heat = model.box.delivered(model.heat(states[:-1], levels, ahead.outdoor), ahead.outdoor)
+    return float((powers * ahead.prices).sum()) * model.step / KILOWATT_HOUR, float(heat.sum()) * model.step
