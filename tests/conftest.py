@@ -37,6 +37,14 @@ def script() -> Callable[[str], ModuleType]:
     return load
 
 
+@pytest.fixture(scope="module")
+def blank_pictures() -> Iterator[None]:
+    """Pages with empty pictures: painting takes as long as a calibration, and tests of the reports look at them."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("mpc.reports.figures.style._uri", lambda figure: "data:image/svg+xml;base64,")
+        yield
+
+
 @pytest.fixture(scope="session")
 def start_postgres(script: Callable[[str], ModuleType]) -> Iterator[Callable[[str], Any]]:
     """Start a PostgreSQL server for tests of an extra; they are skipped by name where it or its driver is absent."""

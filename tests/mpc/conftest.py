@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -38,14 +38,6 @@ def coarse_case(tmp_path_factory: pytest.TempPathFactory) -> Path:
     telemetry = pd.read_parquet(folder / "telemetry.parquet")
     telemetry.resample("30min", closed="right", label="right").mean().to_parquet(folder / "telemetry.parquet")
     return folder
-
-
-@pytest.fixture(scope="module")
-def blank_pictures() -> Iterator[None]:
-    """Pages with empty pictures: painting takes as long as a calibration, and tests of the reports look at them."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("mpc.reports.figures.style._uri", lambda figure: "data:image/svg+xml;base64,")
-        yield
 
 
 def mild_weather(grid: StepGrid) -> Weather:

@@ -127,13 +127,13 @@ def test_left_out_days_make_bands(climbed: CalibrationResult) -> None:
 
 def test_a_gain_that_recurs_is_kept_where_it_predicts_better(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ladder, "_WEEK", 3.0)
-    *_, lumped, recurring, _ = calibrate(case, settings={**QUICK, "climb": True}).rungs
-    further = recurring.parameters - lumped.parameters
-    assert (recurring.name, further) == ("recurring", 6 * len(case.building.zone_names))
-    assert recurring.chosen == (recurring.left_out_mae < 0.9 * lumped.left_out_mae)
-    # it predicts days left out worse here, with five of them to learn from
+    # it predicts days left out worse here, with five of them to learn from: it is kept where it may be twice as wrong
     monkeypatch.setattr(ladder, "ADVANCE", -1.0)
     result = calibrate(case, settings={**QUICK, "climb": True})
+    *_, lumped, recurring, _ = result.rungs
+    further = recurring.parameters - lumped.parameters
+    assert (recurring.name, further) == ("recurring", 6 * len(case.building.zone_names))
+    assert 0.9 * lumped.left_out_mae < recurring.left_out_mae < 2.0 * lumped.left_out_mae
     assert [rung.chosen for rung in result.rungs] == [False] * 4 + [True, False]
     assert result.settings.structure.recurring
     assert "recurs from day to day" in calibration_verdict(result)
