@@ -153,8 +153,8 @@ def _short(alt: str) -> str:
 
 def _uri(figure: Figure) -> str:
     stream = io.StringIO()
-    # not `savefig`, which draws everything once more to lay it out
-    FigureCanvasSVG(figure).print_svg(stream, metadata={"Date": None, "Creator": None})
+    canvas = FigureCanvasSVG(figure)  # not `savefig`, which draws everything once more to lay it out
+    canvas.print_svg(stream, metadata={"Date": None, "Creator": None})  # type: ignore[no-untyped-call]
     drawn = stream.getvalue()
     encoded = base64.b64encode(for_dark(drawn[drawn.index("<svg") :]).encode()).decode("ascii")  # no address of a DTD
     return f"data:image/svg+xml;base64,{encoded}"

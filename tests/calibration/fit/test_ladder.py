@@ -20,12 +20,22 @@ from thermal.data import load_bundled_case
 QUICK = {"dx": 1.0, "starts": 1}
 
 
+def bundled(step: str) -> Case:
+    found = load_bundled_case()
+    frame = found.telemetry.frame.resample(step, closed="right", label="right").mean()
+    return replace(found, telemetry=Telemetry.from_frame(frame), judged=None)
+
+
 @pytest.fixture(scope="module")
 def case() -> Case:
     """The bundled case in quarters of an hour, which are fitted in half the time."""
-    found = load_bundled_case()
-    frame = found.telemetry.frame.resample("15min", closed="right", label="right").mean()
-    return replace(found, telemetry=Telemetry.from_frame(frame), judged=None)
+    return bundled("15min")
+
+
+@pytest.fixture(scope="module")
+def hourly() -> Case:
+    """The same in hours, for what does not depend on how good a fit is."""
+    return bundled("60min")
 
 
 @pytest.fixture(scope="module")
@@ -66,15 +76,17 @@ def test_heat_that_is_stamped_too_early_is_moved(case: Case) -> None:
     assert "with heat and weather moved in time" in calibration_verdict(result)
 
 
-def test_films_that_follow_the_wind_are_kept_without_an_advance(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_films_that_follow_the_wind_are_kept_without_an_advance(
+    case: Case, hourly: Case, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(ladder, "ADVANCE", 1.0)  # nothing with more parameters is better by so much
     result = calibrate(case, settings={**QUICK, "climb": True})
     assert [rung.chosen for rung in result.rungs] == [False, True, False, False]
     assert result.settings.structure.wind_films
     assert result.settings.normalisation is not None and result.settings.normalisation.wind is not None
     assert "outside films that follow the wind" in calibration_verdict(result)
-    frame = case.telemetry.frame.drop(columns="weather_station/wind_speed_sensor")
-    still = replace(case, telemetry=replace(case.telemetry, frame=frame), judged=None)
+    frame = hourly.telemetry.frame.drop(columns="weather_station/wind_speed_sensor")
+    still = replace(hourly, telemetry=replace(hourly.telemetry, frame=frame), judged=None)
     names = [r.name for r in calibrate(still, settings={**QUICK, "climb": True}).rungs]
     assert names[:3] == ["drawn", "zoned", "lumped"]
 
@@ -144,7 +156,7 @@ def test_a_gain_that_recurs_is_kept_where_it_predicts_better(case: Case, monkeyp
 
 @pytest.mark.parametrize("which", [1, 2])
 def test_a_fit_that_is_interrupted_has_no_part_in_the_choice(
-    case: Case, monkeypatch: pytest.MonkeyPatch, which: int
+    hourly: Case, monkeypatch: pytest.MonkeyPatch, which: int
 ) -> None:
     fits = iter(range(9))
 
@@ -156,6 +168,6 @@ def test_a_fit_that_is_interrupted_has_no_part_in_the_choice(
         return replace(found, best=replace(found.best, solve=solve))
 
     monkeypatch.setattr(ladder, "fit_case", interrupted)
-    result = calibrate(case, settings={**QUICK, "climb": True})
+    result = calibrate(hourly, settings={**QUICK, "climb": True})
     assert result.rungs == () and not result.settings.structure.lumped
     assert (result.solver.status, result.solver.success) == ("User_Requested_Stop", False)
