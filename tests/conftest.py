@@ -38,6 +38,14 @@ def script() -> Callable[[str], ModuleType]:
     return load
 
 
+@pytest.fixture(scope="module")
+def blank_pictures() -> Iterator[None]:
+    """Pages with empty pictures: painting takes as long as a calibration, and tests of the reports look at them."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("mpc.reports.figures.style._uri", lambda figure: "data:image/svg+xml;base64,")
+        yield
+
+
 @pytest.fixture(scope="session")
 def bundled_case_in(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     """Write the bundled case in longer steps than its five minutes: what is made of it takes half as long."""

@@ -8,7 +8,6 @@ import numpy as np
 from scipy.linalg import solve_toeplitz
 from scipy.signal import lfilter
 from scipy.stats import chi2, kstwo
-from statsmodels.tsa.stattools import acovf
 
 from calibration.errors import FilterError
 from calibration.estimation.kalman import Filtered
@@ -174,6 +173,8 @@ def _zone(
     series: FloatArray, lags: tuple[int, ...], fitted: int, inputs: Mapping[str, tuple[FloatArray, int]], reach: int
 ) -> ZoneWhiteness:
     """Test one zone's innovations."""
+    from statsmodels.tsa.stattools import acovf  # here: half a second to import, which only reports need
+
     there = np.isfinite(series)
     count = int(there.sum())
     unknown = tuple(np.nan for _ in lags)
@@ -210,6 +211,8 @@ def _cumulated_periodogram(series: FloatArray) -> tuple[float, float]:
 
 def _cross(series: FloatArray, values: FloatArray, first: int, reach: int) -> float:
     """Probability of the correlations with a whitened input at lags ``first`` to ``reach``."""
+    from statsmodels.tsa.stattools import acovf
+
     moved = values - values.mean()
     order = min(_INPUT_ORDER, len(moved) // 10)
     if np.ptp(values) <= 1e-9 * max(1.0, float(np.abs(values).max())) or order < 1:

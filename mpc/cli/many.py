@@ -175,20 +175,23 @@ def absolute(place: str | None) -> str | None:
 
 def _job(what: str) -> Job:
     """Job of a command, whose reports look as this process shows them."""
-    from calibration.fleet.diagnose import diagnosis_job
-    from calibration.fleet.job import calibration_job
-    from mpc.reports.calibration import calibration_files
-    from mpc.reports.diagnosis import diagnosis_files
     from mpc.reports.display import Displayed, display
-    from mpc.studies.many import comparison_job, identification_job
 
     def shown(files: Any) -> Any:
         return plugins.WithPlugins(Displayed(files, display()), plugins.loaded)
 
     if what == "calibrate":
+        from calibration.fleet.job import calibration_job
+        from mpc.reports.calibration import calibration_files
+
         return calibration_job(shown(calibration_files))
     if what == "diagnose":
+        from calibration.fleet.diagnose import diagnosis_job
+        from mpc.reports.diagnosis import diagnosis_files
+
         return diagnosis_job(shown(diagnosis_files))
+    from mpc.studies.many import comparison_job, identification_job
+
     return identification_job(shown) if what == "identify" else comparison_job(shown)
 
 

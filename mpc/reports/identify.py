@@ -28,6 +28,9 @@ _OPERATION = {
     "setpoint": "run by the zone's own controller, by its setpoint",
 }
 
+#: Power that is worth a word [W].
+_SEEN = 1.0
+
 
 def write_identified(
     found: Identified, made: Experiment | None, out: str | Path, *, command: str = "", force: bool = False
@@ -140,11 +143,13 @@ def identify_verdict(found: Identified, made: Experiment | None) -> str:
         )
     else:
         text += "too short to hold days out, so that nothing is known of its errors. "
-    for m in found.model.maps:
-        text += f"{m.machine.name} is to be {_OPERATION[m.operation]}"
-        if m.standing > 1.0:
-            text += f", as it draws {significant(m.standing, 2)} W at any speed"
-        text += ". "
+    for operation, words in _OPERATION.items():
+        names = [m.machine.name for m in found.model.maps if m.operation == operation]
+        if names:
+            text += f"{listed(names)} {'are' if len(names) > 1 else 'is'} to be {words}. "
+    standing = [(m.machine.name, m.standing) for m in found.model.maps if m.standing > _SEEN]
+    if standing:
+        text += f"{listed([f'{name} draws {significant(w, 2)} W' for name, w in standing])} at any speed. "
     if made is not None:
         k = experiment_kpis(made)
         text += (
@@ -189,7 +194,7 @@ def identify_rows(found: Identified) -> list[tuple[str, float, float, float]]:
 
 
 def map_rows(model: PlantModel) -> list[list[str]]:
-    """Rows of the table of maps: machine, what, term, value and interval.
+    """Rows of the table of maps: machine, what, term, value and interval; without terms of less than a watt.
 
     Parameters
     ----------
@@ -200,6 +205,7 @@ def map_rows(model: PlantModel) -> list[list[str]]:
         [name, what, term, f"{spell(value, ',.0f')} W", f"{spell(low, ',.0f')} to {spell(high, ',.0f')} W"]
         for m in model.maps
         for name, what, term, value, (low, high) in _terms(m)
+        if max(abs(low), abs(high)) >= _SEEN
     ]
 
 
@@ -219,7 +225,7 @@ def _content(found: Identified, made: Experiment | None, command: str) -> dict[s
     machines = [
         (m.machine.name, _OPERATION[m.operation],
          listed(m.machine.serves) if len(m.machine.serves) < 5 else "all zones",
-         m.machine.heat or "not measured", significant(m.standing, 2),
+         m.machine.heat or "not measured", significant(m.standing, 2) if m.standing > _SEEN else "0",
          significant(m.efficiency(1.0), 3), significant(m.efficiency(0.5), 3))
         for m in found.model.maps
     ]  # fmt: skip

@@ -1,13 +1,17 @@
 """What a page means for who runs the building: the answer, whether to trust it, what to do next, in plain words."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from calibration.evaluation.n_step import Evaluation
 from calibration.fit.result import CalibrationResult, ParameterEstimate
 from mpc.reports.page import counted, duration, kelvin, listed, percent, significant
-from mpc.studies.run import Comparison, ControlRun
 from thermal.case.check import CaseCheck
+
+if TYPE_CHECKING:  # closed loops take longer to import than all the rest of a report
+    from mpc.studies.run import Comparison, ControlRun
 
 #: Discomfort that nobody notices [K h]: a room a fifth of a degree off for quarter of an hour.
 NOTICED = 0.05

@@ -1,6 +1,9 @@
 """What findings mean for who runs the building: a diagnosis, an experiment, a monitoring, and all of a demo."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from calibration.diagnosis.diagnosis import Diagnosis
 from calibration.evaluation.n_step import Evaluation
@@ -10,8 +13,10 @@ from calibration.monitoring.monitor import Monitoring
 from mpc.reports.diagnosis_words import accepted, ahead, called, candidate, in_zones, rivals
 from mpc.reports.means import Means, comfort_words
 from mpc.reports.page import counted, kelvin, listed, percent, significant, sure
-from mpc.studies.run import Comparison
 from thermal.effects.catalogue import CATALOGUE
+
+if TYPE_CHECKING:
+    from mpc.studies.run import Comparison
 
 #: Probability below which a guess is not worth a measurement of its own [-].
 _A_GUESS = 0.2

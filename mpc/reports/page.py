@@ -125,14 +125,17 @@ def spell(value: Any, how: str = "") -> str:
 
     Examples
     --------
-    >>> spell(-0.0532, ".2f"), spell(0.0532, "kelvin"), spell(float("nan"), ".1f"), spell(0.26, "percent")
-    ('−0.05', '0.053', '–', '26 %')
+    >>> spell(-0.0532, ".2f"), spell(0.0532, "kelvin"), spell(float("nan"), ".1f"), spell(-0.26, ".0f")
+    ('−0.05', '0.053', '–', '0')
     """
     if value is None or value == "" or (isinstance(value, float) and not math.isfinite(value)):
         return _NO_NUMBER
     if how in _SPELLINGS:
         return _SPELLINGS[how](value)
-    return format(value, how).replace("-", "−") if how else str(value)
+    if not how:
+        return str(value)
+    text = format(value, how).replace("-", "−")
+    return text if "+" in how or text.strip("−0.,%") else text.removeprefix("−")  # a zero has no sign
 
 
 @jinja2.pass_environment

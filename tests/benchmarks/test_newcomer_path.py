@@ -34,7 +34,9 @@ def in_process(command: Sequence[str], folder: Path) -> str:
     return answer.stdout
 
 
-def test_from_drawings_to_a_calibrated_simulator(benchmark: ModuleType, tmp_path: Path) -> None:
+def test_from_drawings_to_a_calibrated_simulator(
+    benchmark: ModuleType, blank_pictures: None, tmp_path: Path
+) -> None:
     size = benchmark.Size(seed=1, zones=4, floor_area=200.0, floors=1, days=4.0, dx=1.0, pixel=0.05)
     found = benchmark.walk(tmp_path, size, without_visit=True, without_browser=True, run=in_process)
     names = [step["name"] for step in found["steps"]]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
@@ -9,7 +10,7 @@ import pytest
 from calibration import calibrate
 from calibration.diagnosis.diagnosis import diagnose
 from calibration.progress import USUAL_ITERATIONS, WHOLE, Forward, count_iterations
-from thermal import Case, load_bundled_case
+from thermal import Case, Telemetry, load_bundled_case
 from thermal.effects.catalogue import CATALOGUE
 
 Told = list[tuple[str, int, int]]
@@ -17,7 +18,10 @@ Told = list[tuple[str, int, int]]
 
 @pytest.fixture
 def case() -> Case:
-    return load_bundled_case()
+    """The bundled case in half hours, which take as many steps of a fit."""
+    found = load_bundled_case()
+    frame = found.telemetry.frame.resample("30min", closed="right", label="right").mean()
+    return replace(found, telemetry=Telemetry.from_frame(frame), judged=None)
 
 
 def shares(told: Told) -> list[float]:

@@ -18,6 +18,8 @@ from thermal.data import bundled_case_path
 
 DOCS = Path(__file__).parents[2] / "docs"
 
+pytestmark = pytest.mark.usefixtures("blank_pictures")
+
 
 def follow(guide: str, folder: Path) -> Path:
     """Write the file of a guide and run its command on the bundled case; the folder of its results."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -32,14 +32,6 @@ def building() -> Building:
 def coarse_case(bundled_case_in: Callable[[str], Path]) -> Path:
     """The bundled case in half hours."""
     return bundled_case_in("30min")
-
-
-@pytest.fixture(scope="module")
-def blank_pictures() -> Iterator[None]:
-    """Pages with empty pictures: painting takes as long as a calibration, and tests of the reports look at them."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("mpc.reports.figures.style._uri", lambda figure: "data:image/svg+xml;base64,")
-        yield
 
 
 def mild_weather(grid: StepGrid) -> Weather:

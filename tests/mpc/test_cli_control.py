@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import pytest
 from typer.testing import CliRunner
 
 from mpc.cli.app import app
@@ -13,6 +14,8 @@ from thermal.data import bundled_case_path
 
 CASE = str(bundled_case_path())
 SPAN = ("--start", "2023-03-06T06:00", "--end", "2023-03-06T07:00", "--dx", "1.0")
+
+pytestmark = pytest.mark.usefixtures("blank_pictures")
 
 
 def run(*arguments: str | Path) -> Any:

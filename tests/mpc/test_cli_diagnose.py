@@ -41,21 +41,6 @@ def test_diagnose_writes_what_it_says(coarse_case: Path, tmp_path: Path) -> None
     assert again.exit_code == 2 and "ResultsExistError" in again.stderr
 
 
-def test_the_terminal_has_verdict_candidates_and_how_far(capsys: pytest.CaptureFixture[str]) -> None:
-    from calibration.diagnosis.diagnosis import diagnose
-    from mpc.cli.calibrate import _show_diagnosis as _show
-    from mpc.reports.diagnosis_words import diagnosis_verdict, where_sentence
-    from thermal import load_bundled_case
-
-    result = diagnose(load_bundled_case(), dx=2.0)
-    _show(result)
-    text = capsys.readouterr().out
-    assert text.startswith(diagnosis_verdict(result)) and where_sentence(result.where) in text
-    for s in result.verdict.candidates[:5]:
-        assert s.effect in text
-    assert f"{result.gap:.3f}" in text and f"{result.floor:.3f}" in text
-
-
 @pytest.mark.parametrize(
     ("arguments", "error"),
     [

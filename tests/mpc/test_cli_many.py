@@ -83,8 +83,9 @@ def on_threads(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     return called
 
 
-def start(cases: Path, out: Path) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "mpc.cli", "calibrate", str(cases), "--out", str(out), "--workers", "2", *OPTIONS]
+def start(cases: Path, out: Path, workers: str) -> subprocess.Popen[str]:
+    places = (str(cases), "--out", str(out))
+    command = [sys.executable, "-m", "mpc.cli", "calibrate", *places, "--workers", workers, *OPTIONS]
     return subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
         # who runs the tests in the background has them ignore Ctrl-C, and their children would too
@@ -96,13 +97,13 @@ def start(cases: Path, out: Path) -> subprocess.Popen[str]:
 def test_a_run_that_is_killed_or_interrupted_goes_on(cases: Path, tmp_path: Path, on_threads: list[Any]) -> None:
     """Killed: no worker outlives it. Interrupted: what is finished stays. Repeated: the rest is done."""
     out = tmp_path / "results"
-    with start(cases, out) as command:
+    with start(cases, out, "2") as command:
         killed = wait_for(lambda: processes(out))
         command.kill()
     wait_for(lambda: not any(map(is_alive, killed)))
     assert [p.name for p in out.iterdir()] == [".running"]
 
-    with start(cases, out) as command:
+    with start(cases, out, "1") as command:
         workers = wait_for(lambda: processes(out))
         wait_for(lambda: list(out.glob("*/case.json")))
         workers |= processes(out)
@@ -139,7 +140,7 @@ def test_a_run_that_is_killed_or_interrupted_goes_on(cases: Path, tmp_path: Path
     taught = json.loads(answer.stdout)["parameters"]
     assert answer.exit_code == 0 and taught.keys() and taught != alone
     times = ("--start", "2023-10-02T06:00", "--end", "2023-10-02T12:00", "--controllers", "schedule")
-    answer = run("compare", cases, "--parameters", out, *times, "--workers", "1", "--out", tmp_path / "compared")
+    answer = run("compare", cases, "--parameters", out, *times, "--scheduler", "tcp://x", "--out", tmp_path / "compared")
     assert answer.exit_code == 0, answer.output
     rows = pq.read_table(tmp_path / "compared" / "tables" / "controllers").to_pylist()
     assert [(r["case"], r["controller"]) for r in rows] == [(name, "schedule") for name in NAMES]

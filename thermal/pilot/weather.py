@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-import pvlib
 from scipy.signal import lfilter
 
 from thermal._types import FloatArray
@@ -226,6 +225,8 @@ def _wind(rng: np.random.Generator, middle: pd.DatetimeIndex, step: float) -> di
 
 def _sun(middle: pd.DatetimeIndex, location: Location, cloud: FloatArray) -> dict[str, FloatArray]:
     """Direct normal, diffuse horizontal and global horizontal irradiance [W/m2] in the middle of each interval."""
+    import pvlib  # here: it takes a second to import
+
     place = (location.latitude, location.longitude, location.elevation)
     position = pvlib.solarposition.get_solarposition(middle, *place)
     pressure = pvlib.atmosphere.alt2pres(location.elevation)

@@ -15,6 +15,7 @@ import pandas as pd
 from matplotlib import dates
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
@@ -116,7 +117,8 @@ def picture(figure: Figure, alt: str, *, zoom: bool = False, phone: bool = True)
     shown = display()
     interactive = None
     if zoom:
-        figure.draw_without_rendering()
+        if (layout := figure.get_layout_engine()) is not None:
+            layout.execute(figure)  # for the places of axes
         thin(figure, _SHARPNESS)
         interactive = zoomable(figure, shown)
     thin(figure)
@@ -151,7 +153,8 @@ def _short(alt: str) -> str:
 
 def _uri(figure: Figure) -> str:
     stream = io.StringIO()
-    figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
+    canvas = FigureCanvasSVG(figure)  # not `savefig`, which draws everything once more to lay it out
+    canvas.print_svg(stream, metadata={"Date": None, "Creator": None})  # type: ignore[no-untyped-call]
     drawn = stream.getvalue()
     encoded = base64.b64encode(for_dark(drawn[drawn.index("<svg") :]).encode()).decode("ascii")  # no address of a DTD
     return f"data:image/svg+xml;base64,{encoded}"

@@ -28,6 +28,12 @@ def case(bundled_case_in: Callable[[str], Path]) -> Case:
 
 
 @pytest.fixture(scope="module")
+def hourly(bundled_case_in: Callable[[str], Path]) -> Case:
+    """The same in hours, for what does not depend on how good a fit is."""
+    return load_case(bundled_case_in("60min"))
+
+
+@pytest.fixture(scope="module")
 def climbed(case: Case) -> CalibrationResult:
     return calibrate(case, settings={**QUICK, "climb": True})
 
@@ -65,15 +71,17 @@ def test_heat_that_is_stamped_too_early_is_moved(case: Case) -> None:
     assert "with heat and weather moved in time" in calibration_verdict(result)
 
 
-def test_films_that_follow_the_wind_are_kept_without_an_advance(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_films_that_follow_the_wind_are_kept_without_an_advance(
+    case: Case, hourly: Case, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(ladder, "ADVANCE", 1.0)  # nothing with more parameters is better by so much
     result = calibrate(case, settings={**QUICK, "climb": True})
     assert [rung.chosen for rung in result.rungs] == [False, True, False, False]
     assert result.settings.structure.wind_films
     assert result.settings.normalisation is not None and result.settings.normalisation.wind is not None
     assert "outside films that follow the wind" in calibration_verdict(result)
-    frame = case.telemetry.frame.drop(columns="weather_station/wind_speed_sensor")
-    still = replace(case, telemetry=replace(case.telemetry, frame=frame), judged=None)
+    frame = hourly.telemetry.frame.drop(columns="weather_station/wind_speed_sensor")
+    still = replace(hourly, telemetry=replace(hourly.telemetry, frame=frame), judged=None)
     names = [r.name for r in calibrate(still, settings={**QUICK, "climb": True}).rungs]
     assert names[:3] == ["drawn", "zoned", "lumped"]
 
@@ -126,13 +134,13 @@ def test_left_out_days_make_bands(climbed: CalibrationResult) -> None:
 
 def test_a_gain_that_recurs_is_kept_where_it_predicts_better(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ladder, "_WEEK", 3.0)
-    *_, lumped, recurring, _ = calibrate(case, settings={**QUICK, "climb": True}).rungs
-    further = recurring.parameters - lumped.parameters
-    assert (recurring.name, further) == ("recurring", 6 * len(case.building.zone_names))
-    assert recurring.chosen == (recurring.left_out_mae < 0.9 * lumped.left_out_mae)
-    # it predicts days left out worse here, with five of them to learn from
+    # it predicts days left out worse here, with five of them to learn from: it is kept where it may be twice as wrong
     monkeypatch.setattr(ladder, "ADVANCE", -1.0)
     result = calibrate(case, settings={**QUICK, "climb": True})
+    *_, lumped, recurring, _ = result.rungs
+    further = recurring.parameters - lumped.parameters
+    assert (recurring.name, further) == ("recurring", 6 * len(case.building.zone_names))
+    assert 0.9 * lumped.left_out_mae < recurring.left_out_mae < 2.0 * lumped.left_out_mae
     assert [rung.chosen for rung in result.rungs] == [False] * 4 + [True, False]
     assert result.settings.structure.recurring
     assert "recurs from day to day" in calibration_verdict(result)
@@ -143,7 +151,7 @@ def test_a_gain_that_recurs_is_kept_where_it_predicts_better(case: Case, monkeyp
 
 @pytest.mark.parametrize("which", [1, 2])
 def test_a_fit_that_is_interrupted_has_no_part_in_the_choice(
-    case: Case, monkeypatch: pytest.MonkeyPatch, which: int
+    hourly: Case, monkeypatch: pytest.MonkeyPatch, which: int
 ) -> None:
     fits = iter(range(9))
 
@@ -155,6 +163,6 @@ def test_a_fit_that_is_interrupted_has_no_part_in_the_choice(
         return replace(found, best=replace(found.best, solve=solve))
 
     monkeypatch.setattr(ladder, "fit_case", interrupted)
-    result = calibrate(case, settings={**QUICK, "climb": True})
+    result = calibrate(hourly, settings={**QUICK, "climb": True})
     assert result.rungs == () and not result.settings.structure.lumped
     assert (result.solver.status, result.solver.success) == ("User_Requested_Stop", False)

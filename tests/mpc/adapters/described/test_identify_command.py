@@ -15,6 +15,7 @@ from mpc.cli.app import app
 from mpc.identify.model import read_model
 
 pytest.importorskip("fmpy", reason="needs the extra [fmu]")
+pytestmark = pytest.mark.usefixtures("blank_pictures")
 SPEED = "heat_pump/compressor_speed"
 DESCRIPTION = """
 format: 1
