@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from mpc.identify.limits import bin_of
 from thermal._types import FloatArray
+
+if TYPE_CHECKING:  # whose module imports this one
+    from mpc.identify.maps import Curve
 
 #: A reading: outdoor air [K], load [-], power over that of the map, less 1 [-], and the steps that it is the mean of.
 Reading = tuple[float, float, float, float]
@@ -23,6 +28,25 @@ _SPREAD, _OUTDOOR, _LOAD, _EDGE = 0.3, 3.0, 0.2, 0.1
 
 #: Standard deviation of a step's reading [-], as thermostats run machines for parts of a step, and steps of a mean.
 _READING, _STEPS = 0.1, 8.0
+
+
+@dataclass(frozen=True)
+class OwnPower:
+    """What a machine's own sensor of power says.
+
+    Parameters
+    ----------
+    curve : Curve
+        Power beyond `idle` [W].
+    idle : float
+        Power while it gives nothing [W].
+    readings : tuple of tuple of float
+        Power over that of the curve, see `Reading`.
+    """
+
+    curve: Curve
+    idle: float
+    readings: tuple[Reading, ...] = ()
 
 
 class PowerCorrection:

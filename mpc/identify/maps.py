@@ -9,7 +9,7 @@ from typing import Any, Literal, Self
 import numpy as np
 
 from mpc.errors import PlantError
-from mpc.identify.corrections import PowerCorrection, Reading
+from mpc.identify.corrections import OwnPower, PowerCorrection
 from mpc.identify.limits import OUT_OF_REACH, bin_of
 from mpc.identify.machines import Machine
 from thermal._types import BoolArray, FloatArray
@@ -95,25 +95,6 @@ def features_of(on: Any, u: Any, outdoor: Any, emitter: Any) -> dict[str, Any]:
         "emitter": u * (emitter - EMITTER) / PER,
         "command^2 outdoor": u * u * (outdoor - OUTDOOR) / PER,
     }
-
-
-@dataclass(frozen=True)
-class OwnPower:
-    """What a machine's own sensor of power says.
-
-    Parameters
-    ----------
-    curve : Curve
-        Power beyond `idle` [W].
-    idle : float
-        Power while it gives nothing [W].
-    readings : tuple of tuple of float
-        Power over that of the curve, see `mpc.identify.corrections`.
-    """
-
-    curve: Curve
-    idle: float
-    readings: tuple[Reading, ...] = ()
 
 
 @dataclass(frozen=True)
