@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from mpc.identify.limits import bin_of
 from thermal._types import FloatArray
-
-if TYPE_CHECKING:  # whose module imports this one
-    from mpc.identify.maps import Curve
 
 #: A reading: outdoor air [K], load [-], power over that of the map, less 1 [-], and the steps that it is the mean of.
 Reading = tuple[float, float, float, float]
@@ -30,25 +25,6 @@ _SPREAD, _OUTDOOR, _LOAD, _EDGE = 0.3, 3.0, 0.2, 0.1
 _READING, _STEPS = 0.1, 8.0
 
 
-@dataclass(frozen=True)
-class OwnPower:
-    """What a machine's own sensor of power says.
-
-    Parameters
-    ----------
-    curve : Curve
-        Power beyond `idle` [W].
-    idle : float
-        Power while it gives nothing [W].
-    readings : tuple of tuple of float
-        Power over that of the curve, see `Reading`.
-    """
-
-    curve: Curve
-    idle: float
-    readings: tuple[Reading, ...] = ()
-
-
 class PowerCorrection:
     """Power of a machine over that of its map, less 1: a Gaussian process over outdoor air and load.
 
@@ -58,7 +34,7 @@ class PowerCorrection:
     Parameters
     ----------
     seen : iterable of tuple of float
-        Readings, see `Reading`.
+        Readings, see `Reading` [K, -, - and steps].
     sheet : sequence of tuple of float
         Outdoor air [K], rising, and largest load [-] of a data sheet: beyond an edge of it a machine is another one, of
         which readings before the edge say nothing.

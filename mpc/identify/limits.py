@@ -29,6 +29,9 @@ _SHEET_LEVEL, _SHEET_SHAPE, _TOLD = 0.1, 0.1, 0.5
 #: Medians of the fifths of a normal distribution, in standard deviations [-].
 _FIFTHS = np.array([-1.2816, -0.5244, 0.0, 0.5244, 1.2816])
 
+#: Load above which a machine runs [-].
+_RUNS = 0.05
+
 #: Least load that is relied on [-].
 _LEAST = 0.1
 
@@ -131,3 +134,23 @@ def bin_of(outdoor: float) -> int:
         [K].
     """
     return round(outdoor / BIN)
+
+
+def limits_of(outdoor: FloatArray, level: FloatArray, above: FloatArray) -> tuple[tuple[float, float], ...]:
+    """Find steps at which a setpoint was out of reach, or the load full: outdoor air [K], most load of each bin [-].
+
+    Parameters
+    ----------
+    outdoor : ndarray, shape (n_time,)
+        Outdoor air [K].
+    level : ndarray, shape (n_time,)
+        Loads [-].
+    above : ndarray, shape (n_time,)
+        How far the setpoint lies above the zone's air [K].
+    """
+    found: dict[int, tuple[float, float]] = {}
+    for k in np.flatnonzero((above > OUT_OF_REACH) & (level > _RUNS) | (level >= 1.0)):
+        known = found.get(bin_of(outdoor[k]))
+        if known is None or level[k] > known[1]:
+            found[bin_of(outdoor[k])] = (float(outdoor[k]), float(level[k]))
+    return tuple(sorted(found.values()))

@@ -9,8 +9,8 @@ from typing import Any, Literal, Self
 import numpy as np
 
 from mpc.errors import PlantError
-from mpc.identify.corrections import OwnPower, PowerCorrection
-from mpc.identify.limits import OUT_OF_REACH, bin_of
+from mpc.identify.corrections import PowerCorrection, Reading
+from mpc.identify.limits import limits_of
 from mpc.identify.machines import Machine
 from thermal._types import BoolArray, FloatArray
 
@@ -98,6 +98,25 @@ def features_of(on: Any, u: Any, outdoor: Any, emitter: Any) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
+class OwnPower:
+    """What a machine's own sensor of power says.
+
+    Parameters
+    ----------
+    curve : Curve
+        Power beyond `idle` [W].
+    idle : float
+        Power while it gives nothing [W].
+    readings : tuple of tuple of float
+        Power over that of the curve [-], see `mpc.identify.corrections`.
+    """
+
+    curve: Curve
+    idle: float
+    readings: tuple[Reading, ...] = ()
+
+
+@dataclass(frozen=True)
 class MachineMap:
     """What a machine does.
 
@@ -165,8 +184,7 @@ class MachineMap:
         outdoor, emitter : float
             Temperatures [K].
         """
-        expected = 0.0 if self.own is None else float(self.at(self.own.curve, u, outdoor, emitter))
-        if self.own is None or expected <= 0.0:
+        if self.own is None or (expected := float(self.at(self.own.curve, u, outdoor, emitter))) <= 0.0:
             return np.nan
         return float(np.clip((power - self.own.idle) / expected - 1.0, *_RATIOS))
 
@@ -329,7 +347,7 @@ def map_machines(
             made.append(replace(found, operation=_operation(found)))
         else:
             level, over = loads.level[:, m], above[:, m]
-            made.append(replace(found, above=_local(level, over), limits=_limits(loads.outdoor, level, over)))
+            made.append(replace(found, above=_local(level, over), limits=limits_of(loads.outdoor, level, over)))
     made = [
         found if power is None else _with_own(found, m, loads, power)
         for m, (found, power) in enumerate(zip(made, own or [None] * len(made), strict=True))
@@ -344,10 +362,8 @@ def _with_own(found: MachineMap, m: int, loads: Loads, power: FloatArray) -> Mac
     learned = found.correction()
     for k in np.flatnonzero(loads.known & np.isfinite(power)):
         u = float(loads.level[k, m])
-        if found.operation == "duty" and u < 1.0:  # a part load, which is none of its own
-            continue
         ratio = found.ratio(float(power[k]), u, float(loads.outdoor[k]), float(loads.emitter[k, m]))
-        if np.isfinite(ratio):
+        if np.isfinite(ratio) and (found.operation != "duty" or u >= 1.0):  # a part load is none of its own
             learned.learn(float(loads.outdoor[k]), u, ratio)
     return replace(found, own=OwnPower(curve, idle, learned.readings))
 
@@ -367,16 +383,6 @@ def _local(level: FloatArray, above: FloatArray) -> tuple[float, float]:
         return 0.0, 1.0
     slope, zero = np.polyfit(level[between], above[between], 1)
     return float(zero), float(zero + max(slope, 0.0))
-
-
-def _limits(outdoor: FloatArray, level: FloatArray, above: FloatArray) -> tuple[tuple[float, float], ...]:
-    """Outdoor air and load of steps at which a setpoint was out of reach, or the load full: the most of each bin."""
-    found: dict[int, tuple[float, float]] = {}
-    for k in np.flatnonzero((above > OUT_OF_REACH) & (level > _SAME) | (level >= 1.0)):
-        known = found.get(bin_of(outdoor[k]))
-        if known is None or level[k] > known[1]:
-            found[bin_of(outdoor[k])] = (float(outdoor[k]), float(level[k]))
-    return tuple(sorted(found.values()))
 
 
 def interval_of(curve: Curve, feature: str) -> tuple[float, float]:
