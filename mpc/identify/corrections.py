@@ -34,7 +34,7 @@ class PowerCorrection:
     Parameters
     ----------
     seen : iterable of tuple of float
-        Readings, see `Reading` [K, -, - and steps].
+        Readings: outdoor air [K], load [-], power over that of the map, less 1 [-], and steps; see `Reading`.
     sheet : sequence of tuple of float
         Outdoor air [K], rising, and largest load [-] of a data sheet: beyond an edge of it a machine is another one, of
         which readings before the edge say nothing.
