@@ -73,8 +73,8 @@ class Sought:
     free : Free or None
         What was sought about a free structure, where the drawing does not hold.
     left_over : Regular or None
-        What comes back of the errors of the last model, about a free structure, and where something would be left
-        unexplained.
+        What comes back of the errors of the last model, about a free structure, and where it decides whether an effect
+        that was accepted is named.
     faults : tuple of Fault
         Of the telemetry, which were mended before anything else.
     last_third : float or None
@@ -200,7 +200,7 @@ def seek(
             free = search_free(models, structures.kept, known, ruled_out, whole.part(0.6, "free structure"))
             models, rounds, untestable, left_over = free.models, free.rounds, free.untestable, free.left_over
             structures = structures._replace(kept=free.kept)
-        elif about_drawing == "unexplained" and not is_large(case.building.zone_names):
+        elif about_drawing == "unexplained" and rounds[0].accepted and not is_large(case.building.zone_names):
             left_over = regular(models, rounds[-1].after)
     steps, floor = how_far(models, rounds)
     verdict = doubted(judge(rounds, untestable, left_over), {s.effects[-1] for s in steps if s.void})
