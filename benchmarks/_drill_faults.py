@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from _drill_process import HANGS
 from _drill_stack import RATE, STEP, STUCK, Stack
 
 from mpc.live.clock import set_clock
@@ -187,6 +188,17 @@ def _no_disk(stack: Stack, rng: random.Random) -> Seconds:
     return time.monotonic()
 
 
+def _hang(stack: Stack, rng: random.Random) -> Seconds:
+    """Let the disk take the guard's lines no more, without a word."""
+    (stack.site.folder / HANGS).touch()
+    return time.monotonic()
+
+
+def _free(stack: Stack, rng: random.Random) -> Seconds:
+    (stack.site.folder / HANGS).unlink()
+    return _new_guard(stack, rng)
+
+
 def _new_guard(stack: Stack, rng: random.Random) -> Seconds:
     stack.processes["guard"].ended(20.0)
     return _start("guard")(stack, rng)
@@ -292,6 +304,7 @@ FAULTS: dict[str, Fault] = {
     "database down": Fault(_down, _up),
     "database full": Fault(_fill, _empty),
     "disk of the log full": Fault(_no_disk, _new_guard),
+    "disk of the log hangs": Fault(_hang, _free),
     "solver fails": Fault(_input("outdoor", -60.0, "did not converge"), _mild),
     "plan without numbers": Fault(_input("outdoor", 35.0, "no number"), _mild),
     "plan out of range": Fault(_input("heat", 1e6, "planned"), _mild),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import shutil
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
@@ -35,6 +36,23 @@ def script() -> Callable[[str], ModuleType]:
         return sys.modules[name]
 
     return load
+
+
+@pytest.fixture(scope="session")
+def bundled_case_in(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """Write the bundled case in longer steps than its five minutes: what is made of it takes half as long."""
+    import pandas as pd  # once threads are limited
+
+    from thermal.data import bundled_case_path
+
+    def write(step: str) -> Path:
+        folder = tmp_path_factory.mktemp("coarse") / "coarse"
+        shutil.copytree(bundled_case_path(), folder)
+        telemetry = pd.read_parquet(folder / "telemetry.parquet")
+        telemetry.resample(step, closed="right", label="right").mean().to_parquet(folder / "telemetry.parquet")
+        return folder
+
+    return write
 
 
 @pytest.fixture(scope="session")

@@ -12,7 +12,7 @@ import numpy as np
 
 from calibration.errors import CalibrationError
 from calibration.estimation.disturbance import DisturbanceModel, DisturbedSpace
-from calibration.estimation.state_space import StateSpace
+from calibration.estimation.state_space import REFERENCE, StateSpace
 from thermal._types import BoolArray, FloatArray
 
 #: Nodes of a zone, in the order of the states: all air nodes first.
@@ -216,6 +216,16 @@ class GreyBox:
         weights = np.zeros(self.shares.shape)
         weights[nz : 2 * nz] = by_zone / by_zone.sum(axis=0)
         return np.asarray(weights)
+
+    def emitter(self, states: FloatArray) -> FloatArray:
+        """Temperature of what each source heats, shape (..., n_source) [K].
+
+        Parameters
+        ----------
+        states : ndarray, shape (..., n)
+            Nodes less the reference first [K]; what follows them is passed over.
+        """
+        return np.asarray(REFERENCE + states[..., : self.capacity.size] @ self.emitter_weights)
 
     @cached_property
     def input_matrix(self) -> FloatArray:

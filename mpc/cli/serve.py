@@ -19,6 +19,7 @@ from mpc.cli.console import Progress, Waiting, answer, say, show_table
 from mpc.cli.evaluate import run_check
 from mpc.cli.options import Dx, Json, Parameters, file, switch, value
 from mpc.errors import BoptestError, MpcError
+from mpc.reports.display import Display, showing
 from thermal.errors import LabelError
 
 if TYPE_CHECKING:
@@ -185,11 +186,11 @@ def _prepare(desk: LabelDesk, drawings: Path) -> None:
         import_sheet(desk, drawings)
 
 
-def _make_apart(kind: str, case: Path, out: Path, progress: Progress) -> None:
+def _make_apart(kind: str, case: Path, out: Path, progress: Progress, units: str = "si") -> None:
     """Make a report in a process of its own, so that the page stays quick, and stop it with the job."""
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe(duplex=False)
-    process = context.Process(target=_make, args=(kind, case, out, there, plugins.loaded), daemon=True)
+    process = context.Process(target=_make, args=(kind, case, out, there, units, plugins.loaded), daemon=True)
     process.start()
     there.close()
     try:
@@ -221,13 +222,16 @@ def _leave(number: int, frame: object) -> None:
     raise SystemExit(128 + number)
 
 
-def _make(kind: str, case: Path, out: Path, connection: Connection[Any, Any], named: Sequence[str]) -> None:
+def _make(
+    kind: str, case: Path, out: Path, connection: Connection[Any, Any], units: str, named: Sequence[str]
+) -> None:
     """Make a report; what goes wrong is told in a sentence."""
     signal.signal(signal.SIGTERM, _leave)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the page's: it ends this process by the other signal
     try:
         plugins.load_plugins(named)
-        _MAKERS[kind](case, out, True, lambda *told: connection.send(told))
+        with showing(Display(units=units)):
+            _MAKERS[kind](case, out, True, lambda *told: connection.send(told))
     except Exception as error:
         connection.send(("error", f"{type(error).__name__}: {error}"))
     finally:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibration.estimation.state_space import REFERENCE
 from calibration.grey_box.fit import GreyBoxData, fit_grey_box, follow
 from calibration.grey_box.judge import LeadError, judge
 from calibration.grey_box.network import GreyBox
@@ -107,7 +106,7 @@ def _loads(telemetry: PlantTelemetry, machines: Sequence[Machine], data: GreyBox
     """Collect loads, with the temperatures of the emitters as the grey box has them."""
     states = follow(box, data).states[:-1]
     level = np.column_stack([machine.level(telemetry) for machine in machines])
-    emitter = states[:, : box.capacity.size] @ box.emitter_weights + REFERENCE
+    emitter = box.emitter(states)
     first = round(86_400.0 / telemetry.step)  # the filter's start
     emitter[:first] = emitter[first : 2 * first].mean(axis=0) if len(emitter) > 2 * first else EMITTER
     return Loads(level, data.outdoor, emitter)

@@ -8,12 +8,16 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
+import numpy as np
+
 from calibration.errors import CalibrationError
 from calibration.grey_box.network import GreyBox
 from mpc.errors import ControlError, MpcError
 from mpc.identify.machines import Machine
 from mpc.identify.maps import Curve, MachineMap
+from mpc.identify.telemetry import CARRIERS
 from mpc.loop.actuators import Actuator
+from thermal._types import FloatArray
 
 #: File of a model in its folder, and the version of its contents.
 FILE, FORMAT = "model.json", 2
@@ -42,6 +46,44 @@ class PlantModel:
     box: GreyBox
     maps: tuple[MachineMap, ...]
     base: Mapping[str, float] = field(default_factory=dict)
+
+    def heat(self, states: FloatArray, levels: FloatArray, outdoor: FloatArray | float) -> FloatArray:
+        """Heat of each machine, or what stands for it where it is not measured, shape (..., n_machine) [W].
+
+        Parameters
+        ----------
+        states : ndarray, shape (..., n)
+            Of the grey box, at the starts of the steps [K less the reference].
+        levels : ndarray, shape (..., n_machine)
+            Duties and loads [-].
+        outdoor : ndarray, shape (...), or float
+            Outdoor air [K].
+        """
+        emitter = self.box.emitter(states)
+        heat = np.empty(emitter.shape)
+        for k, found in enumerate(self.maps):
+            heat[..., k] = found.at(found.heat, levels[..., k], outdoor, emitter[..., k])
+        return heat
+
+    def bought(self, states: FloatArray, levels: FloatArray, outdoor: FloatArray | float) -> FloatArray:
+        """Power that each machine buys, shape (..., n_machine, n_carrier) [W]; `base` is not among it.
+
+        Parameters
+        ----------
+        states, levels, outdoor : ndarray
+            As of `heat` [K less the reference], [-] and [K].
+        """
+        emitter = self.box.emitter(states)
+        powers = np.zeros((*emitter.shape, len(CARRIERS)))
+        for k, found in enumerate(self.maps):
+            for carrier, curve in found.powers.items():
+                powers[..., k, CARRIERS.index(carrier)] = found.at(curve, levels[..., k], outdoor, emitter[..., k])
+        return powers
+
+    @property
+    def bought_anyway(self) -> FloatArray:
+        """The same of `base`, shape (n_carrier,) [W]."""
+        return np.array([self.base.get(carrier, 0.0) for carrier in CARRIERS])
 
     def to_dict(self) -> dict[str, Any]:
         """Values for a file."""

@@ -38,16 +38,16 @@ def export(zones: list[str], path: Path) -> None:
     pd.DataFrame({"timestamp": stamps, **columns}).to_csv(path, index=False)
 
 
-def stand_in(seconds: float, name: str) -> Callable[[Path, Path, Progress], None]:
+def stand_in(seconds: float, name: str) -> Callable[[Path, Path, Progress, str], None]:
     """Make something that takes a while and writes a page at the end."""
 
-    def make(case: Path, out: Path, progress: Progress) -> None:
+    def make(case: Path, out: Path, progress: Progress, units: str) -> None:
         for done in range(20):
             progress("fitting", done, 20)
             time.sleep(seconds / 20)
         out.mkdir(parents=True, exist_ok=True)
         (out / f"{name}.json").write_text("{}", encoding="utf-8")
-        (out / "report.html").write_text('<p class="verdict">It fits.</p>', encoding="utf-8")
+        (out / "report.html").write_text(f'<p class="verdict">It fits, in {units}.</p>', encoding="utf-8")
 
     return make
 

@@ -1,9 +1,9 @@
 // Gives a case its telemetry on the page, corrects a column, looks at plots, and makes reports through a reload and a stop.
-// node telemetry.mjs ADDRESS FOLDER MODULES CHROMIUM [PICTURES]; writes what it saw to stdout as JSON.
+// node telemetry.mjs ADDRESS FOLDER MODULES CHROMIUM SENTENCES [PICTURES]; SENTENCES: a list as JSON, to be read in feet; writes what it saw to stdout as JSON.
 import { createRequire } from "node:module";
 import { join } from "node:path";
 
-const [, , address, folder, modules, executablePath, pictures] = process.argv;
+const [, , address, folder, modules, executablePath, sentences, pictures] = process.argv;
 const { chromium } = createRequire(join(modules, "index.js"))("playwright-core");
 const faults = [], seen = {};
 const expect = (holds, text) => { if (!holds) throw new Error(`expected ${text}`); };
@@ -50,6 +50,25 @@ async function notRedWhileSaving() {
   await page.unroute("**/api/draft?*");
 }
 
+// What is shown and typed turns to feet and °F; the case stays in SI units.
+async function units() {
+  const metres = Number(await page.inputValue("#floor-height"));
+  await page.click("#units");
+  await page.waitForSelector("#units:has-text('m, °C')");
+  expect(Math.abs(Number(await page.inputValue("#floor-height")) - metres / 0.3048) < 1e-3, "the height in feet");
+  await page.fill("#floor-height", "10");
+  await page.press("#floor-height", "Tab");
+  await saved();
+  seen.height = await page.inputValue("#floor-height");
+  seen.area = await page.textContent(".zone text:last-of-type");
+  seen.bar = await page.textContent("#scalebar");
+  seen.told = await page.evaluate(async (texts) => {
+    const { told } = await import(new URL("static/units.js", location));
+    return texts.map(told);
+  }, JSON.parse(sentences));
+  await picture("feet");
+}
+
 async function telemetry() {
   await page.click("#telemetry");
   await page.waitForSelector("#telemetry-body:has-text('no telemetry yet')");
@@ -70,6 +89,8 @@ async function telemetry() {
   seen.verdict = await page.textContent("#telemetry-verdict");
   await page.locator("table.columns").first().getByRole("button").first().click();
   await page.waitForSelector(".plot svg path");
+  await page.getByRole("button", { name: "OAT", exact: true }).or(page.getByRole("button", { name: /outside_air_temperature/ })).last().click();
+  await page.waitForSelector(".plot figcaption:has-text('°F')");
   await picture("checked");
 }
 
@@ -109,6 +130,7 @@ await page.goto(address);
 await page.waitForSelector(".zone");
 await place();
 await notRedWhileSaving();
+await units();
 await telemetry();
 await reports();
 await phone();

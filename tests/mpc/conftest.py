@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -18,7 +17,6 @@ from mpc.scenario.tariff import CarbonIntensity, Tariff
 from mpc.scenario.weather import Weather
 from thermal import Building, ZoneTable
 from thermal.case.building import Location, ZoneEntry
-from thermal.data import bundled_case_path
 
 BAY = Location(latitude=37.4, longitude=-122.1, elevation=20.0, timezone="America/Los_Angeles")
 
@@ -31,13 +29,9 @@ def building() -> Building:
 
 
 @pytest.fixture(scope="session")
-def coarse_case(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The bundled case in half hours: what commands make of it takes half as long as in five minutes."""
-    folder = tmp_path_factory.mktemp("coarse") / "coarse"
-    shutil.copytree(bundled_case_path(), folder)
-    telemetry = pd.read_parquet(folder / "telemetry.parquet")
-    telemetry.resample("30min", closed="right", label="right").mean().to_parquet(folder / "telemetry.parquet")
-    return folder
+def coarse_case(bundled_case_in: Callable[[str], Path]) -> Path:
+    """The bundled case in half hours."""
+    return bundled_case_in("30min")
 
 
 @pytest.fixture(scope="module")

@@ -124,8 +124,9 @@ def test_it_serves_the_page_until_it_is_interrupted(tmp_path: Path) -> None:
 def test_a_report_is_made_in_a_process_of_its_own(drawings: Path, served: list[Any], tmp_path: Path) -> None:
     run(drawings)
     case, told = drawings.with_suffix(""), []
-    _label._make_apart("check", case, tmp_path / "out", lambda *words: told.append(words))
-    assert (tmp_path / "out" / "report.html").is_file() and ("check", 0, 1) in told
+    _label._make_apart("check", case, tmp_path / "out", lambda *words: told.append(words), "ip")
+    assert "ft²" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert ("check", 0, 1) in told
     with pytest.raises(Exception, match="MpcError|expected|Error") as caught:
         _label._make_apart("calibrate", case, tmp_path / "out2", lambda *words: None)
     assert type(caught.value).__name__ == "MpcError"

@@ -120,11 +120,15 @@ class StepSums:
         sums = np.bincount(of, weights=values, minlength=size).reshape(-1, span)
         self._sums[:, first : first + span] += sums
         self._counts[:, first : first + span] += counts.astype(np.uint32)
-        total = counts.sum(axis=1)
-        dense = total >= span
-        self._dense += dense & (total > 0)
-        self._sparse += ~dense & (total > 0)
-        self._keep(rows, times, values, ~dense[rows])
+        few = self._judged(slice(None), counts.sum(axis=1), span)
+        self._keep(rows, times, values, few[rows])
+
+    def _judged(self, rows: IntArray | slice, total: IntArray, span: int) -> BoolArray:
+        """Note which points have a sample a step on a day of so many steps; return which have fewer, if any."""
+        some, dense = total > 0, total >= span
+        self._dense[rows] += dense & some
+        self._sparse[rows] += ~dense & some
+        return ~dense & some
 
     def _keep(self, rows: IntArray, times: IntArray, values: FloatArray, sparse: BoolArray) -> None:
         """Keep samples of points with fewer than a step has."""
@@ -166,11 +170,8 @@ class StepSums:
         at = np.ix_(rows, steps[starts])
         self._sums[at] += np.add.reduceat(sums, starts, axis=1)
         self._counts[at] += np.add.reduceat(counts, starts, axis=1, dtype=np.uint32)
-        total = counts.sum(axis=1, dtype=np.int64)
-        dense = total >= steps[-1] - steps[0] + 1
-        self._dense[rows] += dense & (total > 0)
-        self._sparse[rows] += ~dense & (total > 0)
-        return np.asarray(points[~dense & (total > 0)])
+        few = self._judged(rows, counts.sum(axis=1, dtype=np.int64), int(steps[-1] - steps[0]) + 1)
+        return np.asarray(points[few])
 
     def keep(self, points: IntArray, samples: Any) -> None:
         """Keep the samples of points that `add_slots` named.

@@ -7,11 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.estimation.state_space import REFERENCE
-from calibration.grey_box.network import COP_AT, COP_PER
 from mpc.baselines.plants import DIFFERENCE, LEAD
 from mpc.control.identified.ahead import Ahead
 from mpc.control.identified.problem import IdentifiedProblem
-from mpc.identify.telemetry import CARRIERS
 from mpc.scenario.rates import KILOWATT_HOUR
 from thermal._types import FloatArray
 
@@ -78,8 +76,7 @@ def _rule(
 ) -> tuple[FloatArray, FloatArray]:
     """States and levels of the rule."""
     model, step = problem.model, problem.stage.step
-    zones, count = model.box.zones, len(ahead.outdoor)
-    served = [np.array([zone in found.machine.serves for zone in zones], dtype=bool) for found in model.maps]
+    zones, count, served = model.box.zones, len(ahead.outdoor), model.box.serves
     near = max(round(LEAD / model.step), 1)
     state, most, runs = start[0], start[1], start[2].astype(bool).copy()
     states, levels = np.empty((count + 1, state.size)), np.zeros((count, len(served)))
@@ -108,14 +105,6 @@ def _rule(
 def _bought(problem: IdentifiedProblem, ahead: Ahead, states: FloatArray, levels: FloatArray) -> tuple[float, float]:
     """Cost [currency] and heat [J] of levels along states."""
     model = problem.model
-    emitter = REFERENCE + states[:-1] @ model.box.emitter_weights
-    cost, heat = 0.0, 0.0
-    for carrier, base in model.base.items():
-        cost += float(base * ahead.prices[:, CARRIERS.index(carrier)].sum())
-    for k, found in enumerate(model.maps):
-        slope = 1.0 + float(model.box.slopes[k]) * (ahead.outdoor - COP_AT) / COP_PER
-        heat += float((found.at(found.heat, levels[:, k], ahead.outdoor, emitter[:, k]) * slope).sum())
-        for carrier, curve in found.powers.items():
-            power = found.at(curve, levels[:, k], ahead.outdoor, emitter[:, k])
-            cost += float(np.asarray(power * ahead.prices[:, CARRIERS.index(carrier)]).sum())
-    return cost * model.step / KILOWATT_HOUR, heat * model.step
+    powers = model.bought(states[:-1], levels, ahead.outdoor).sum(axis=1) + model.bought_anyway
+    heat = model.box.delivered(model.heat(states[:-1], levels, ahead.outdoor), ahead.outdoor)
+    return float((powers * ahead.prices).sum()) * model.step / KILOWATT_HOUR, float(heat.sum()) * model.step

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -320,8 +319,7 @@ class IdentifiedController:
     def _by_rule(self, measurements: Measurements, ahead: Ahead) -> FloatArray:
         """Levels without a plan: full where a zone is too cold, else none."""
         inside = self._inside(self._observer.zones(measurements) - REFERENCE, ahead)
-        served = [[zone in found.machine.serves for zone in self.model.box.zones] for found in self.model.maps]
-        return np.array([float((inside < self._kept[0])[np.array(mine)].any()) for mine in served])
+        return np.array([float((inside < self._kept[0])[mine].any()) for mine in self.model.box.serves])
 
     def _note(self, levels: FloatArray) -> None:
         """Write down which machines run."""
@@ -344,16 +342,16 @@ class IdentifiedController:
             level = float(levels[k])
             if found.operation == "setpoint":
                 actuator = self._actuators[found.machine.name]
-                told = self._thermostats.tell(k, level, most[k], zone, self._edges_of(found, ahead))
+                told = self._thermostats.tell(k, level, most[k], zone, self._edges_of(k, ahead))
                 value = float(np.clip(told, actuator.lowest, actuator.highest))
             else:
                 value = self._command(found, level)
             values[found.machine.name] = value
         return values
 
-    def _edges_of(self, found: MachineMap, ahead: Ahead) -> tuple[float, float]:
+    def _edges_of(self, k: int, ahead: Ahead) -> tuple[float, float]:
         """Edges of the band of the zones of a machine, the lower one with what is kept from it [K]."""
-        served = [k for k, name in enumerate(self.model.box.zones) if name in found.machine.serves]
+        served = self.model.box.serves[k]
         return float((ahead.lower[0] + self._kept[0])[served].max()), float(ahead.upper[:2, served].min())
 
     def _command(self, found: MachineMap, level: float) -> float:
@@ -376,12 +374,6 @@ class IdentifiedController:
 
     def _powers(self, solution: StageSolution, ahead: Ahead) -> FloatArray:
         """Give expected electricity and other carriers, shape (N, 2) [W]."""
-        emitter = REFERENCE + solution.states[:-1, : self.model.box.capacity.size] @ self.model.box.emitter_weights
-        powers = np.zeros((len(solution.decisions), 2))
-        for carrier, base in self.model.base.items():
-            powers[:, int(carrier != "electricity")] += base
-        for k, found in enumerate(self.model.maps):
-            for carrier, curve in found.powers.items():
-                value: Any = found.at(curve, solution.decisions[:, k], ahead.outdoor, emitter[:, k])
-                powers[:, int(carrier != "electricity")] += value
-        return powers
+        model = self.model
+        bought = model.bought(solution.states[:-1], solution.decisions, ahead.outdoor).sum(axis=1) + model.bought_anyway
+        return np.column_stack([bought[:, 0], bought[:, 1:].sum(axis=1)])

@@ -167,11 +167,6 @@ class ElectricStage:
         self.generation = ca.SX.sym("generation")
         self.banded = [name for name in names if name != "peak"]
 
-    @property
-    def sizes(self) -> tuple[int, int]:
-        """Number of states and of decisions."""
-        return len(self.state), len(self.decision)
-
     def following(self, machines: ca.SX, price: ca.SX) -> tuple[ca.SX, ca.SX]:
         """States after a step, and what it costs [currency].
 

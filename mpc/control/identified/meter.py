@@ -6,11 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from calibration.estimation.state_space import REFERENCE
 from mpc.control.identified.ahead import Ahead
 from mpc.control.identified.electric import Electric, ElectricNow
 from mpc.identify.model import PlantModel
-from mpc.identify.telemetry import CARRIERS
 from mpc.loop.plant import Measurements
 from mpc.scenario.forecast import Forecast
 from thermal._types import FloatArray
@@ -75,12 +73,7 @@ class ElectricMeter:
         state : ndarray
             Of the observer [K and W].
         """
-        box, outdoor = self.model.box, ahead.outdoor[0]
-        emitter = REFERENCE + state[: box.capacity.size] @ box.emitter_weights
-        self._modelled = np.zeros(len(self.model.maps))
-        for k, found in enumerate(self.model.maps):
-            if CARRIERS[0] in found.powers:
-                self._modelled[k] = found.at(found.powers[CARRIERS[0]], levels[k], outdoor, emitter[k])
+        self._modelled = self.model.bought(state, levels, ahead.outdoor[0])[:, 0]
         power = 0.0 if self.electric.battery is None else self.electric.battery.power
-        base = self.model.base.get(CARRIERS[0], 0.0)
+        base = float(self.model.bought_anyway[0])
         self._net = base + power * values.get(self.electric.command, 0.0) - self._generation

@@ -90,12 +90,9 @@ class GreyBoxObserver:
         """
         model, space = self.model, self._whole.space
         outdoor = self.outdoor(measurements, before)
-        emitter = REFERENCE + self.state[: space.order] @ model.box.emitter_weights
-        heat = np.empty(len(model.maps))
-        for k, found in enumerate(model.maps):
-            told = measurements[found.machine.heat] if found.machine.heat in measurements else np.nan
-            modelled = found.at(found.heat, levels[k], outdoor, emitter[k])
-            heat[k] = told if np.isfinite(told) else modelled
+        columns = [found.machine.heat for found in model.maps]
+        told = np.array([measurements[column] if column in measurements else np.nan for column in columns])
+        heat = np.where(np.isfinite(told), told, model.heat(self.state, levels, outdoor))
         given = model.box.delivered(heat, np.asarray(outdoor))
         u = np.concatenate([[outdoor - REFERENCE], before.sun[0], given, before.gain[0]])
         error = self.zones(measurements) - REFERENCE - self._whole.observation @ self.state - space.feedthrough @ u

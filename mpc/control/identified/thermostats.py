@@ -37,9 +37,7 @@ class Thermostats:
         self._limits = [HeatLimit(found.limits, found.sheet) for found in model.maps]
         self._is_led = np.array([found.operation == "setpoint" for found in model.maps], dtype=bool)
         self._told, self._zone = np.full(len(model.maps), np.nan), np.full(len(model.box.zones), np.nan)
-        self._served = [
-            np.array([name in found.machine.serves for name in model.box.zones], dtype=bool) for found in model.maps
-        ]
+        self._served = model.box.serves
 
     def most(self, outdoor: FloatArray) -> FloatArray:
         """Largest loads, shape (N, n_machine) [-]: 1 of machines that are commanded.

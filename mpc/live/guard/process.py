@@ -8,6 +8,8 @@ import fcntl
 import json
 import os
 from collections.abc import Mapping
+from concurrent.futures import Future
+from threading import Thread
 from typing import Any
 
 from mpc.errors import LiveError
@@ -25,6 +27,9 @@ from mpc.live.site import Site
 
 #: Ticks that the end of the guard takes at most, so that releases are seen to have been done.
 _LAST_TICKS = 5
+
+#: How long a line of the log may take, as a share of the control step: everything is given back within one step.
+_PATIENCE = 0.5
 
 #: Answers to requests of operators that the status keeps: more than are asked for while somebody waits.
 _ANSWERS = 50
@@ -122,7 +127,7 @@ class GuardProcess:
         }  # fmt: skip
         tick = json.loads(json.dumps(tick))  # what is decided on is what the log will say
         decision = self.guard.decide(tick)
-        digest = self.log.append("tick", {"tick": tick, "decision": decision})
+        digest = await self._note("tick", {"tick": tick, "decision": decision})
         self._results = await self._order(decision["writes"], decision["releases"])
         self._ordered = self.clock.mono()
         plan = self.guard.state.plan
@@ -136,6 +141,23 @@ class GuardProcess:
         }  # fmt: skip
         self._notifier.tell(decision["doubts"], tick["wall"])
         return decision
+
+    async def _note(self, kind: str, content: Mapping[str, Any]) -> str:
+        """Add an event to the log; a disk that takes longer than a share of the step is one that takes nothing."""
+        written: Future[str] = Future()
+
+        def write() -> None:
+            try:
+                written.set_result(self.log.append(kind, content))
+            except Exception as error:
+                written.set_exception(error)
+
+        Thread(target=write, daemon=True).start()  # of its own: nothing may wait for it, not even the end
+        patience = _PATIENCE * self.rules.limits.step
+        try:
+            return await asyncio.wait_for(asyncio.wrap_future(written), self.clock.real(patience))
+        except TimeoutError as error:
+            raise LiveError("audit log", "a disk that takes a line", f"none within {patience:g} s") from error
 
     async def _read(self) -> dict[str, dict[str, Any]]:
         """Read what may be written, of all connections at a time."""

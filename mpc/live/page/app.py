@@ -16,7 +16,7 @@ from mpc.live.page.access import Access, Role, page_tokens
 from mpc.live.page.metrics import metrics
 from mpc.live.site import Site
 from mpc.live.state import read_state
-from mpc.reports.units import inch_pound
+from thermal.display_units import inch_pound
 from thermal.plan.guard import extra
 
 #: Longest body of a request [bytes], time between two events of the stream [s], and most streams at a time.

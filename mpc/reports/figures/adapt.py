@@ -17,8 +17,9 @@ from matplotlib.text import Text
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, ScalarFormatter
 
 from mpc.reports.display import Display
-from mpc.reports.units import NUMBER, Line, converted_number, inch_pound
+from mpc.reports.units import NUMBER, converted_number
 from thermal._types import FloatArray
+from thermal.display_units import Line, inch_pound
 
 #: Width of a figure on a phone [inch]: 374 px, which a screen of 390 px shows at about nine tenths.
 NARROW = 3.9

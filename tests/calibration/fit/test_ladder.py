@@ -1,6 +1,8 @@
 """The choice between a building as drawn and lumped, by tuning days that are left out."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,18 +16,15 @@ from calibration.fit.fitted_case import FittedCase, fit_case
 from calibration.fit.result import CalibrationResult
 from mpc.reports.calibration import calibration_verdict
 from thermal.case.case import Case
-from thermal.case.telemetry import Telemetry
-from thermal.data import load_bundled_case
+from thermal.case.load import load_case
 
 QUICK = {"dx": 1.0, "starts": 1}
 
 
 @pytest.fixture(scope="module")
-def case() -> Case:
-    """The bundled case in quarters of an hour, which are fitted in half the time."""
-    found = load_bundled_case()
-    frame = found.telemetry.frame.resample("15min", closed="right", label="right").mean()
-    return replace(found, telemetry=Telemetry.from_frame(frame), judged=None)
+def case(bundled_case_in: Callable[[str], Path]) -> Case:
+    """The bundled case in quarters of an hour."""
+    return load_case(bundled_case_in("15min"))
 
 
 @pytest.fixture(scope="module")

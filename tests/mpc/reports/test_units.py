@@ -9,8 +9,8 @@ from mpc.reports.units import (
     converted_page,
     converted_row,
     converted_text,
-    inch_pound,
 )
+from thermal.display_units import inch_pound
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,8 @@ from thermal.plan.folder import OWN_FOLDER
 from thermal.plan.guard import inside_folder
 from thermal.plan.page.jobs import Progress
 
-#: Makes a report of a case: case folder, folder of the results, progress.
-ReportMaker = Callable[[Path, Path, Progress], None]
+#: Makes a report of a case: case folder, folder of the results, progress, units that it is shown in (si, ip).
+ReportMaker = Callable[[Path, Path, Progress, str], None]
 
 _PAGE = "report.html"
 _KINDS = {
@@ -132,7 +132,7 @@ class Reports:
                     return path
         raise ReportError("report", "one of the list", repr(key[:40]), "load the list anew")
 
-    def make(self, kind: str, progress: Progress) -> dict[str, Any]:
+    def make(self, kind: str, progress: Progress, units: str = "si") -> dict[str, Any]:
         """Make a report.
 
         Parameters
@@ -141,6 +141,8 @@ class Reports:
             One of `kinds`.
         progress : callable
             Told stage, steps done and all steps.
+        units : {"si", "ip"}
+            That the report is shown in.
 
         Returns
         -------
@@ -154,7 +156,7 @@ class Reports:
         """
         out = self._case / OWN_FOLDER / "reports" / self.checked_kind(kind)
         ReportError.unless(not out.is_symlink(), str(out), "a folder of the page's own", "a link", "remove it")
-        self._makers[kind](self._case, out, progress)
+        self._makers[kind](self._case, out, progress, units)
         return self._report(out / _PAGE).to_dict()
 
     def checked_kind(self, kind: str) -> str:

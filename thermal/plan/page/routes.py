@@ -3,13 +3,14 @@
 from dataclasses import asdict
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from fastapi import FastAPI, Query, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import FileResponse, JSONResponse, Response
 
+from thermal.display_units import inch_pound_lines
 from thermal.errors import LabelError, OversizedFileError, PlanError, ReportError, SessionHeldError, ThermalError
 from thermal.plan.drawing import DOTS_PER_INCH, RASTER_KINDS, read_drawing
 from thermal.plan.folder import png_of
@@ -33,6 +34,7 @@ _TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".
 _STATUS: dict[type[ThermalError], int] = {SessionHeldError: 409, OversizedFileError: 413, ReportError: 404}
 
 Window = Annotated[str, Query(max_length=100)]
+Units = Literal["si", "ip"]
 
 
 def routes_of(desk: LabelDesk) -> FastAPI:
@@ -73,6 +75,10 @@ def _add_page(app: FastAPI) -> None:
         ReportError.unless(name in known, "address", "a file of the page", repr(name[:80]))
         kind = _TYPES.get(name[name.rfind(".") :], "application/octet-stream")
         return Response(known[name].read_bytes(), media_type=kind)
+
+    @app.get("/api/units")
+    def units() -> dict[str, Any]:
+        return {unit: line._asdict() for unit, line in inch_pound_lines().items()}
 
 
 def _add_draft(app: FastAPI, desk: LabelDesk) -> None:
@@ -202,9 +208,9 @@ def _add_reports(app: FastAPI, desk: LabelDesk) -> None:
         return {"reports": [report.to_dict() for report in desk.reports.found()], "running": running}
 
     @app.post("/api/reports/{kind}")
-    def make(kind: str) -> dict[str, Any]:
+    def make(kind: str, units: Units = "si") -> dict[str, Any]:
         busy = desk.jobs.busy(desk.reports.checked_kind(kind))
-        job = busy or desk.jobs.start(kind, lambda progress: desk.reports.make(kind, progress), REPORTS)
+        job = busy or desk.jobs.start(kind, lambda progress: desk.reports.make(kind, progress, units), REPORTS)
         return job.to_dict()
 
     @app.get("/reports/{key}/{name:path}")

@@ -15,7 +15,7 @@ from thermal.plan.page.serve import create_app
 Progress = Callable[[str, int, int], None]
 
 
-def write_report(case: Path, out: Path, progress: Progress) -> None:
+def write_report(case: Path, out: Path, progress: Progress, units: str) -> None:
     """Make a report of one sentence."""
     progress("writing", 1, 2)
     out.mkdir(parents=True, exist_ok=True)
@@ -23,12 +23,12 @@ def write_report(case: Path, out: Path, progress: Progress) -> None:
     (out / "report.html").write_text(f'<p class="verdict bad">Fine &amp;\n {case.name}</p>', encoding="utf-8")
 
 
-def fail(case: Path, out: Path, progress: Progress) -> None:
+def fail(case: Path, out: Path, progress: Progress, units: str) -> None:
     """Fail as a fit without telemetry does."""
     raise ValueError("no telemetry")
 
 
-def run_on(case: Path, out: Path, progress: Progress) -> None:
+def run_on(case: Path, out: Path, progress: Progress, units: str) -> None:
     """Work until stopped."""
     while True:
         progress("working", 0, 1)
@@ -76,8 +76,8 @@ def test_a_report_is_made_and_shown_in_a_box(reader: Any, busy_desk: LabelDesk) 
 
 
 def test_reports_of_results_are_found_and_links_out_are_not(reader: Any, busy_desk: LabelDesk, tmp_path: Path) -> None:
-    write_report(tmp_path, tmp_path / "results" / "first", lambda *_: None)
-    write_report(tmp_path, tmp_path / "secret", lambda *_: None)
+    write_report(tmp_path, tmp_path / "results" / "first", lambda *_: None, "si")
+    write_report(tmp_path, tmp_path / "secret", lambda *_: None, "si")
     (busy_desk.store.folder / "link").symlink_to(tmp_path / "secret")
     listed = reader.get(reader.at("api/reports")).json()["reports"]
     assert [report["title"] for report in listed] == ["first"]
@@ -85,7 +85,7 @@ def test_reports_of_results_are_found_and_links_out_are_not(reader: Any, busy_de
 
 def test_a_report_leads_to_those_below_it_and_to_nothing_else(reader: Any, tmp_path: Path) -> None:
     for name in ("demo", "demo/check", "other"):
-        write_report(tmp_path, tmp_path / "results" / name, lambda *_: None)
+        write_report(tmp_path, tmp_path / "results" / name, lambda *_: None, "si")
     (tmp_path / "results" / "demo" / "demo.json").write_text("{}", encoding="utf-8")
     listed = {report["title"]: report for report in reader.get(reader.at("api/reports")).json()["reports"]}
     assert listed["demo"]["kind"] == "from check to control"

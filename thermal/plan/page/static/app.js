@@ -10,6 +10,7 @@ import { openReports, resume } from "./reports.js";
 import * as store from "./store.js";
 import { openTelemetry } from "./telemetry.js";
 import { TOOLS, choose, drawToolbar, escape, holdSpace, nextDevice, planKey, removeSelected, skipDevice, tool } from "./tools.js";
+import * as units from "./units.js";
 
 const { page } = store;
 
@@ -38,6 +39,23 @@ function renderSaved() {
   const pill = byId("saved"), text = page.mode === "read" ? "Read only" : words[page.saved];
   if (pill.textContent !== text) pill.textContent = text;
   pill.className = `pill ${page.mode === "read" ? "read" : page.saved === "trouble" ? "bad" : page.saved !== "saved" ? "busy" : errors || !page.written ? "open" : "good"}`;
+}
+
+function renderUnits() {
+  const feet = units.chosen() === "ip";
+  byId("units").textContent = feet ? "m, °C" : "ft, °F";
+  byId("units").title = feet ? "Show and type in SI units" : "Show and type in inch-pound units; the case stays in SI units";
+}
+
+async function turnUnits() {
+  try {
+    await units.turn();
+  } catch (error) {
+    toast(`${error.refusal || error.name}: ${error.message}`, "error");
+  }
+  renderUnits();
+  view.applyView();
+  store.tell("all");
 }
 
 function renderClock() {
@@ -170,6 +188,7 @@ function wire() {
     const dark = document.documentElement.dataset.theme || (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
     localStorage.setItem("buildingmpc-theme", document.documentElement.dataset.theme = dark === "dark" ? "light" : "dark");
   };
+  byId("units").onclick = turnUnits;
   byId("zoom-in").onclick = () => view.zoom(1.3);
   byId("zoom-out").onclick = () => view.zoom(1 / 1.3);
   byId("zoom-fit").onclick = () => view.fit();
@@ -189,6 +208,8 @@ async function start() {
   wire();
   view.plan.dataset.tool = "select";
   try {
+    await units.load();
+    renderUnits();
     const held = await store.open();
     await store.load();
     if (!held.mine) showHeld(held);

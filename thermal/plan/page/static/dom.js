@@ -1,5 +1,7 @@
 // Small helpers of the page: elements, toasts, one dialog.
 
+import { told } from "./units.js";
+
 export const byId = (id) => document.getElementById(id);
 
 // el("button", {class: "x", onclick: f}, "text", child)
@@ -16,7 +18,7 @@ export function el(tag, attributes = {}, ...children) {
 }
 
 export function toast(text, kind = "") {
-  const note = el("p", { class: `toast ${kind}` }, text, el("button", { type: "button", title: "Dismiss", onclick: () => note.remove() }, "×"));
+  const note = el("p", { class: `toast ${kind}` }, told(text), el("button", { type: "button", title: "Dismiss", onclick: () => note.remove() }, "×"));
   byId("toasts").append(note);
   setTimeout(() => note.remove(), kind === "error" ? 12000 : 4000);
 }
@@ -28,7 +30,7 @@ export function field(label, input, message = "") {
     input.setAttribute("aria-invalid", "true");
     input.setAttribute("aria-describedby", `${id}-m`);
   }
-  return el("div", { class: "field" }, el("label", { for: id }, label), input, message && el("p", { class: "message", id: `${id}-m` }, message));
+  return el("div", { class: "field" }, el("label", { for: id }, label), input, message && el("p", { class: "message", id: `${id}-m` }, told(message)));
 }
 
 export function select(options, value, attributes = {}) {

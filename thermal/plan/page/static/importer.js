@@ -6,6 +6,7 @@ import { decodeFloor } from "./grid.js";
 import { takeList } from "./panels.js";
 import { change, page, save, tell } from "./store.js";
 import { takeTable } from "./telemetry.js";
+import { shown, told, typed, unitOf } from "./units.js";
 
 const DRAWINGS = [".png", ".jpg", ".jpeg", ".pdf", ".dxf", ".csv", ".npy", ".npz"];
 const LISTS = [".ttl", ".json", ".zinc"], TABLES = [".parquet", ".xlsx", ".txt"];
@@ -62,7 +63,7 @@ export async function importFiles(files) {
 
 function status(text, bad = false) {
   const line = byId("import-status");
-  if (line) { line.textContent = text; line.className = bad ? "message" : "soft"; }
+  if (line) { line.textContent = told(text); line.className = bad ? "message" : "soft"; }
 }
 
 export async function openImport() {
@@ -149,19 +150,25 @@ async function forget(sheet) {
 
 const input = (sheet, key, type = "text", more = {}) => el("input", { type, id: `sheet-${key}`, value: sheet[key], step: "any", oninput: set(sheet, key), autocomplete: "off", ...more });
 
+// A length or an area: kept in SI units, written and read in those that are shown.
+function quantity(label, unit, sheet, key, note = "") {
+  const take = (event) => { sheet[key] = typed(event.target.value, unit); refresh(); };
+  return field(`${label} [${unitOf(unit)}]${note}`, input(sheet, key, "number", { min: 0, value: shown(sheet[key], unit), oninput: take }));
+}
+
 function sheetPanel(sheet) {
   const away = el("button", { type: "button", onclick: () => forget(sheet) }, "Remove this file");
   if (sheet.kind === "unreadable") return el("div", {}, el("p", { class: "message pad" }, sheet.message), away);
-  const scale = sheet.kind === "raster" ? rasterScale(sheet) : sheet.kind === "codes" ? field("Side of a cell [m]", input(sheet, "cell", "number"))
-    : field("Metres in a unit of the drawing (empty: what the drawing says)", input(sheet, "unit", "number"));
+  const scale = sheet.kind === "raster" ? rasterScale(sheet) : sheet.kind === "codes" ? quantity("Side of a cell", "m", sheet, "cell")
+    : quantity("A unit of the drawing", "m", sheet, "unit", " (empty: what the drawing says)");
   return el("div", {},
-    el("div", { class: "grid four" }, field("Floor", input(sheet, "floor")), field("Clear height [m]", input(sheet, "floorHeight", "number")),
+    el("div", { class: "grid four" }, field("Floor", input(sheet, "floor")), quantity("Clear height", "m", sheet, "floorHeight"),
       sheet.dots_per_inch ? field("Page of the PDF", input(sheet, "page", "number", { min: 1, onchange: () => draw() })) : null,
       el("label", { class: "check" }, el("input", { type: "checkbox", checked: sheet.include, onchange: set(sheet, "include") }), " use this drawing")),
     scale,
     el("details", {}, el("summary", {}, "More settings"), el("div", { class: "grid four" },
-      field("Widest door [m]", input(sheet, "wide", "number")), field("Smaller rooms join their neighbour [m²]", input(sheet, "small", "number")),
-      sheet.kind === "vector" && field("Height of the windows that it shows [m]", input(sheet, "glass", "number")),
+      quantity("Widest door", "m", sheet, "wide"), quantity("Smaller rooms join their neighbour", "m²", sheet, "small"),
+      sheet.kind === "vector" && quantity("Height of the windows that it shows", "m", sheet, "glass"),
       sheet.kind === "raster" && el("label", { class: "check" }, el("input", { type: "checkbox", id: "sheet-words", checked: sheet.words, disabled: !sheet.read_text, onchange: set(sheet, "words") }), sheet.read_text ? " read the names of rooms from the picture" : " names of rooms in a picture: run apt install tesseract-ocr"), away)));
 }
 
@@ -176,10 +183,10 @@ function rasterScale(sheet) {
   const others = sheets.filter((s) => s !== sheet && s.kind === "raster" && s.include && s.width === sheet.width && s.height === sheet.height);
   const parts = {
     points: () => [el("p", { class: "soft" }, "Click two points whose distance you know, far apart: the ends of a dimension line, two outer corners. Click again to move the nearer one."),
-      el("div", { class: "grid four" }, field("Their distance [m]", input(sheet, "distance", "number", { min: 0 })), pointField(sheet, 0), pointField(sheet, 1),
+      el("div", { class: "grid four" }, quantity("Their distance", "m", sheet, "distance"), pointField(sheet, 0), pointField(sheet, 1),
         others.length > 0 && el("button", { type: "button", onclick: () => { for (const o of others) Object.assign(o, { method: "points", points: sheet.points.map((p) => [...p]), distance: sheet.distance }); refresh(); toast("Same scale for the other drawings of this size."); } }, "Same for the others"))],
     paper: () => [field("Scale on paper, 1 to", input(sheet, "paper", "number"))],
-    pixel: () => [field("Size of a pixel [m]", input(sheet, "pixelSize", "number"))],
+    pixel: () => [quantity("Size of a pixel", "m", sheet, "pixelSize")],
   }[sheet.method]();
   setTimeout(drawMarks);
   return el("div", {}, field("Scale by", method), ...parts, frame);

@@ -7,6 +7,7 @@ import { floorOf, page, change, save, select, tell } from "./store.js";
 import * as view from "./plan.js";
 import { placeFinder } from "./place.js";
 import { choose, nextDevice, tool } from "./tools.js";
+import { measured, shown as inUnits, told, typed, unitOf } from "./units.js";
 
 const TYPES = [["vav", "VAV terminal"], ["fan_coil", "Fan coil"], ["electric_heater", "Electric heater"], ["radiator", "Radiator"],
   ["supply_air_terminal", "Supply air terminal"], ["ahu", "Air handler"], ["boiler", "Boiler"], ["chiller", "Chiller"]];
@@ -178,6 +179,9 @@ const number = (value, done, attributes = {}) => el("input", {
   type: "number", step: "any", value: value ?? "", disabled: reading(), onchange: (e) => { const v = e.target.value === "" ? null : Number(e.target.value); if (v === null || Number.isFinite(v)) done(v); }, ...attributes,
 });
 
+// A number with its unit, written and read in the units that are shown; a bound in attributes is in them, too.
+const quantity = (label, unit, value, done, attributes = {}, message = "") => field(`${label} [${unitOf(unit)}]`, number(inUnits(value, unit), (v) => done(typed(v, unit)), attributes), message);
+
 function zonePanel(zone) {
   const facts = page.zones[zone], glass = page.draft.glazing[zone] || {}, trouble = messageOf("zone", zone), off = reading();
   const devices = page.draft.devices.filter((d) => d.zone === zone);
@@ -185,7 +189,7 @@ function zonePanel(zone) {
   return [
     el("h2", {}, `Zone ${zone}`),
     field("Name", text(zone, (value, input) => { if (!edits.rename(zone, value)) input.value = zone; }, { id: "zone-name" }), trouble),
-    el("p", { class: "facts" }, facts ? `${facts.area.toFixed(1)} m² · ${devices.length} device${devices.length === 1 ? "" : "s"}` : ""),
+    el("p", { class: "facts" }, facts ? `${measured(facts.area, "m²")} · ${devices.length} device${devices.length === 1 ? "" : "s"}` : ""),
     el("div", { class: "row" },
       el("button", { type: "button", disabled: off, onclick: () => choose("split") }, "Split (X)"),
       el("button", { type: "button", disabled: off || page.selection.zones.length < 2, onclick: () => edits.merge() }, "Merge (M)"),
@@ -194,7 +198,7 @@ function zonePanel(zone) {
     devices.length ? el("ul", { class: "plain" }, devices.map((d) => el("li", {}, el("button", { type: "button", class: "link", onclick: () => { select({ devices: [d.name] }); } }, d.name), ` ${d.type}`)))
       : el("p", { class: "soft" }, "No device serves this zone."),
     el("h3", {}, "Glazing"),
-    sides.length ? el("div", { class: "grid" }, sides.map((side) => field(`${side} [m²], of ${(facts?.facades?.[side] || 0).toFixed(1)}`, number(glass[side], (v) => edits.glaze(zone, side, v), { min: "0", id: `glazing-${side}`, placeholder: `${facts?.glazing?.[side] || 0}` }))))
+    sides.length ? el("div", { class: "grid" }, sides.map((side) => quantity(`${side}, of ${measured(facts?.facades?.[side] || 0, "m²")}`, "m²", glass[side], (v) => edits.glaze(zone, side, v), { min: "0", id: `glazing-${side}`, placeholder: `${inUnits(facts?.glazing?.[side] || 0, "m²")}` })))
       : el("p", { class: "soft" }, "This zone has no facade."),
     sides.length > 0 && el("p", { class: "soft" }, "Empty: as the window-to-wall ratio on the tab Building says. 0: no window."),
   ];
@@ -220,7 +224,7 @@ function selectionPanel() {
   if (zones.length === 1) return zonePanel(zones[0]);
   if (zones.length > 1) {
     const area = zones.reduce((sum, z) => sum + (page.zones[z]?.area || 0), 0);
-    return [el("h2", {}, `${zones.length} zones`), el("p", { class: "facts" }, `${area.toFixed(1)} m² together`), el("ul", { class: "plain" }, zones.map((z) => el("li", {}, z))),
+    return [el("h2", {}, `${zones.length} zones`), el("p", { class: "facts" }, `${measured(area, "m²")} together`), el("ul", { class: "plain" }, zones.map((z) => el("li", {}, z))),
       el("div", { class: "row" }, el("button", { type: "button", class: "primary", disabled: reading(), onclick: () => edits.merge() }, "Merge (M)"),
         el("button", { type: "button", disabled: reading(), onclick: () => edits.dropZones(zones) }, "Remove (Del)"))];
   }
@@ -242,7 +246,7 @@ const site = (key, value) => change(`edit ${key}`, { site: { ...page.draft.site,
 
 function buildingPanel() {
   const { site: place, orientation, cell_size: size } = page.draft, off = reading();
-  const numbers = [["latitude", "Latitude [°], north positive"], ["longitude", "Longitude [°], east positive"], ["elevation", "Elevation [m]"]];
+  const numbers = [["latitude", "Latitude [°], north positive"], ["longitude", "Longitude [°], east positive"]];
   const zones = el("datalist", { id: "timezones" }, (Intl.supportedValuesOf?.("timeZone") || []).map((zone) => el("option", { value: zone })));
   const floor = floorOf();
   return [
@@ -250,19 +254,20 @@ function buildingPanel() {
     field("Name of the case", text(page.draft.name, (v) => change("rename the case", { name: v.trim() }), { id: "case-name" }), messageOf("site", "name")),
     placeFinder((found) => change("choose the place", { site: found }), off),
     el("div", { class: "grid" }, numbers.map(([key, label]) => field(label, number(place[key], (v) => site(key, v), { id: `site-${key}` }), messageOf("site", key))),
+      quantity("Elevation", "m", place.elevation, (v) => site("elevation", v), { id: "site-elevation" }, messageOf("site", "elevation")),
       field("Orientation [°], true north to the plan's up", number(orientation, (v) => change("orientation", { orientation: v || 0 }), { id: "orientation" }), messageOf("site", "orientation"))),
     field("Time zone, IANA name", text(place.timezone, (v) => site("timezone", v.trim()), { id: "site-timezone", list: "timezones", placeholder: "Europe/Berlin" }), messageOf("site", "timezone")), zones,
     !place.timezone && el("button", { type: "button", class: "link", disabled: off, onclick: () => site("timezone", Intl.DateTimeFormat().resolvedOptions().timeZone) }, "Take this computer's"),
-    el("p", { class: "soft" }, `Cells of ${size} m. ${page.telemetry ? `Telemetry: ${page.telemetry}.` : "No telemetry yet: button Telemetry, or drop the file on this page."}`),
+    el("p", { class: "soft" }, `Cells of ${Number(inUnits(size, "m").toPrecision(4))} ${unitOf("m")}. ${page.telemetry ? `Telemetry: ${page.telemetry}.` : "No telemetry yet: button Telemetry, or drop the file on this page."}`),
     el("h3", {}, "Windows: share of the facade that is glass"),
     el("p", { class: "soft" }, "For the whole building. Floors below and single zones (tab Selection) may differ; an empty field takes what stands in grey."),
-    ratioFields(""), ...[...errorsOf("case", "")].map((f) => el("p", { class: "message" }, f.message)),
+    ratioFields(""), ...[...errorsOf("case", "")].map((f) => el("p", { class: "message" }, told(f.message))),
     floor && [
       el("h2", {}, `Floor ${floor.name}`),
       el("div", { class: "grid" },
         field("Name", text(floor.name, (v) => edits.editFloor({ name: v.trim() }), { id: "floor-name" }), messageOf("floor", floor.name)),
-        field("Clear height [m]", number(floor.height, (v) => v > 0 && edits.editFloor({ height: v }), { id: "floor-height", min: "0.1" }))),
-      el("h3", {}, "Windows of this floor"), ratioFields(floor.name), ...errorsOf("case", floor.name).map((f) => el("p", { class: "message" }, f.message)),
+        quantity("Clear height", "m", floor.height, (v) => v > 0 && edits.editFloor({ height: v }), { id: "floor-height", min: "0.1" })),
+      el("h3", {}, "Windows of this floor"), ratioFields(floor.name), ...errorsOf("case", floor.name).map((f) => el("p", { class: "message" }, told(f.message))),
       el("div", { class: "row" },
         el("button", { type: "button", disabled: off || page.floor === 0, onclick: () => edits.moveFloor(-1) }, "Lower"),
         el("button", { type: "button", disabled: off || page.floor === page.draft.floors.length - 1, onclick: () => edits.moveFloor(1) }, "Higher"),
@@ -288,7 +293,7 @@ export function showFinding(finding) {
 function problemsPanel() {
   const errors = page.findings.filter((f) => f.level === "error"), remarks = page.findings.filter((f) => f.level !== "error");
   const rows = (found) => el("ul", { class: "findings" }, found.slice(0, MOST).map((f) => el("li", { class: f.level },
-    el("button", { type: "button", onclick: () => showFinding(f) }, el("strong", {}, f.kind === "case" || f.kind === "site" ? f.kind : `${f.kind} ${f.name}`), el("span", {}, f.message)))));
+    el("button", { type: "button", onclick: () => showFinding(f) }, el("strong", {}, f.kind === "case" || f.kind === "site" ? f.kind : `${f.kind} ${f.name}`), el("span", {}, told(f.message))))));
   return [
     el("h2", {}, errors.length ? `${errors.length} to put right` : "This is a valid case"),
     errors.length ? rows(errors) : el("p", {}, page.telemetry ? "It is in the case folder, and every command takes it." : "It is in the case folder, and every command takes it as soon as there is telemetry."),

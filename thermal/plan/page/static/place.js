@@ -2,6 +2,7 @@
 
 import * as api from "./api.js";
 import { byId, el, field } from "./dom.js";
+import { measured } from "./units.js";
 
 const now = { text: "", places: null, trouble: "" };
 
@@ -21,7 +22,7 @@ export function placeFinder(chosen, off) {
   const draw = () => {
     const box = byId("places") || found;
     box.replaceChildren(...(now.places || []).map(({ name, ...site }) => el("button", { type: "button", class: "place", onclick: () => { now.places = null; now.trouble = ""; chosen(site); } },
-      el("strong", {}, name), el("span", {}, ` ${site.latitude}°, ${site.longitude}°, ${site.timezone}, about ${site.elevation} m above the sea (a coarse map: correct it below)`))), now.trouble ? el("p", { class: "soft" }, now.trouble) : "");
+      el("strong", {}, name), el("span", {}, ` ${site.latitude}°, ${site.longitude}°, ${site.timezone}, about ${measured(site.elevation, "m", 0)} above the sea (a coarse map: correct it below)`))), now.trouble ? el("p", { class: "soft" }, now.trouble) : "");
   };
   queueMicrotask(draw);
   return el("div", { class: "finder" }, el("div", { class: "row" }, field("Place: a city, or latitude and longitude", input), el("button", { type: "button", id: "find-place", disabled: off, onclick: find }, "Find")), found);

@@ -4,6 +4,7 @@ import { address } from "./api.js";
 import { EXTERIOR, INTERIOR } from "./grid.js";
 import { measure, trace } from "./shapes.js";
 import { floorOf, page } from "./store.js";
+import { measured, typed, unitOf } from "./units.js";
 
 const NS = "http://www.w3.org/2000/svg";
 const LETTERS = { vav: "V", fan_coil: "F", electric_heater: "E", radiator: "R", supply_air_terminal: "S", ahu: "A", boiler: "B", chiller: "C" };
@@ -46,10 +47,11 @@ export function applyView() {
   svg.style.setProperty("--cell", view.scale);
   svg.classList.toggle("far", view.scale < 5);
   const bar = document.getElementById("scalebar");
-  const metres = page.draft ? [50, 20, 10, 5, 2, 1, 0.5].find((m) => (m / page.draft.cell_size) * view.scale < 140) || 0.5 : 1;
+  const wide = (length) => (typed(length, "m") / page.draft.cell_size) * view.scale; // pixels
   if (page.draft) {
-    bar.style.width = `${(metres / page.draft.cell_size) * view.scale}px`;
-    bar.textContent = `${metres} m`;
+    const length = [200, 100, 50, 20, 10, 5, 2, 1, 0.5].find((m) => wide(m) < 140) || 0.5;
+    bar.style.width = `${wide(length)}px`;
+    bar.textContent = `${length} ${unitOf("m")}`;
   }
 }
 
@@ -205,9 +207,9 @@ export function mark() {
     group.classList.toggle("served", served.has(name));
     group.classList.toggle("selected", page.selection.zones.includes(name));
     group.classList.toggle("wrong", Boolean(trouble));
-    group.children[3].textContent = `${area.toFixed(1)} m²`;
+    group.children[3].textContent = measured(area, "m²");
     const count = served.get(name) || 0;
-    group.setAttribute("aria-label", `${name} ${area.toFixed(1)} m², zone with ${count || "no"} device${count === 1 ? "" : "s"}${trouble ? `. Error: ${trouble}` : ""}`);
+    group.setAttribute("aria-label", `${name} ${measured(area, "m²")}, zone with ${count || "no"} device${count === 1 ? "" : "s"}${trouble ? `. Error: ${trouble}` : ""}`);
     group.setAttribute("aria-pressed", page.selection.zones.includes(name));
   }
   for (const group of layers.devices.children) {

@@ -1,5 +1,7 @@
 // Pictures of columns: the band between lowest and highest value of each part of time.
 
+import { shown, unitOf } from "./units.js";
+
 const make = (tag, attributes, ...children) => {
   const element = document.createElementNS("http://www.w3.org/2000/svg", tag);
   for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
@@ -30,8 +32,8 @@ function bands({ low, high }, width, height, [least, most]) {
 }
 
 export function spark(column) {
-  const range = rangeOf(column);
-  const svg = make("svg", { viewBox: "0 0 120 26", class: "spark", role: "img", "aria-label": range ? `from ${short(range[0])} to ${short(range[1])}` : "no numbers", preserveAspectRatio: "none" });
+  const range = rangeOf(column), text = (value) => short(shown(value, column.unit || ""));
+  const svg = make("svg", { viewBox: "0 0 120 26", class: "spark", role: "img", "aria-label": range ? `from ${text(range[0])} to ${text(range[1])}` : "no numbers", preserveAspectRatio: "none" });
   if (range) svg.append(make("path", { d: bands(column, 120, 26, range) }));
   return svg;
 }
@@ -39,12 +41,12 @@ export function spark(column) {
 export const short = (value) => (Math.abs(value) >= 1e5 || (value && Math.abs(value) < 1e-3) ? value.toExponential(2) : String(Number(value.toPrecision(4))));
 
 export function figure(plot, title) {
-  const range = rangeOf(plot), box = document.createElement("figure"), caption = document.createElement("figcaption");
+  const range = rangeOf(plot), text = (value) => short(shown(value, plot.unit || "")), box = document.createElement("figure"), caption = document.createElement("figcaption");
   box.className = "plot";
-  caption.textContent = `${title}${plot.unit ? ` [${plot.unit}]` : ""}`;
+  caption.textContent = `${title}${plot.unit ? ` [${unitOf(plot.unit)}]` : ""}`;
   box.append(caption);
   if (!range) { caption.textContent += ": no numbers"; return box; }
-  const begin = Date.parse(plot.start), whole = Math.max(Date.parse(plot.end) - begin, 1), svg = make("svg", { viewBox: "0 0 600 150", preserveAspectRatio: "none", role: "img", "aria-label": `${title}, from ${short(range[0])} to ${short(range[1])}` });
+  const begin = Date.parse(plot.start), whole = Math.max(Date.parse(plot.end) - begin, 1), svg = make("svg", { viewBox: "0 0 600 150", preserveAspectRatio: "none", role: "img", "aria-label": `${title}, from ${text(range[0])} to ${text(range[1])}` });
   for (const [from, to, what] of plot.marks) {
     const x = (600 * (Date.parse(from) - begin)) / whole, width = Math.max(2, (600 * (Date.parse(to) - Date.parse(from))) / whole);
     svg.append(make("rect", { x, y: 0, width, height: 150, class: "flaw" }, make("title", {})));
@@ -59,7 +61,7 @@ export function figure(plot, title) {
   };
   const day = (text) => text.slice(0, 16).replace("T", " ");
   const kinds = [...new Set(plot.marks.map(([, , what]) => what))];
-  box.append(ends("ends", `highest ${short(range[1])}`), svg, ends("ends", day(plot.start), `lowest ${short(range[0])}`, day(plot.end)));
+  box.append(ends("ends", `highest ${text(range[1])}`), svg, ends("ends", day(plot.start), `lowest ${text(range[0])}`, day(plot.end)));
   if (kinds.length) box.append(ends("ends flawed", `marked: ${kinds.join(", ")}`));
   return box;
 }

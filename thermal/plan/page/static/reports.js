@@ -3,6 +3,7 @@
 import * as api from "./api.js";
 import { byId, el, openDialog, toast } from "./dom.js";
 import { page, save } from "./store.js";
+import * as units from "./units.js";
 
 const WORDS = {
   check: ["Check", "Geometry drawn, quality of the telemetry, what each point is. Seconds."],
@@ -64,7 +65,7 @@ function draw(reports) {
   });
   const rows = reports.map((report) => el("tr", {},
     el("td", {}, el("a", { href: api.address(`reports/${report.key}/report.html`), target: "_blank", rel: "noopener" }, capital(report.kind === "other" ? report.title : report.kind))),
-    el("td", { class: "found" }, report.verdict), el("td", { class: "soft" }, report.title || "made here"), el("td", { class: "soft" }, moment(report.time))));
+    el("td", { class: "found" }, units.told(report.verdict)), el("td", { class: "soft" }, report.title || "made here"), el("td", { class: "soft" }, moment(report.time))));
   body.replaceChildren(
     errors ? el("p", { class: "message" }, "Reports can be made as soon as the case is valid.") : !page.telemetry ? el("p", { class: "soft" }, "The case has no telemetry yet: check works, calibrate and diagnose wait for it (button Telemetry).") : "",
     el("div", { class: "cards" }, cards),
@@ -82,7 +83,7 @@ const words = (state) => (state.state === "waiting" ? "waits for the report befo
 export async function make(kind) {
   try {
     await save();
-    watch(kind, await api.send(`api/reports/${kind}`));
+    watch(kind, await api.send(`api/reports/${kind}`, {}, { query: { units: units.chosen() } }));
     await refresh();
   } catch (error) {
     toast(`${error.refusal || error.name}: ${error.message}`, "error");

@@ -5,6 +5,7 @@ import { byId, el, field, openDialog, select as choice, toast } from "./dom.js";
 import { figure, short, spark } from "./plots.js";
 import { make as makeReport, openReports } from "./reports.js";
 import { page, reloadVerdict, save } from "./store.js";
+import { shown, told, unitOf } from "./units.js";
 
 const MOST = 150; // rows at once
 const SURE = 0.7; // of the confidence of a match, below which a look is asked for
@@ -20,7 +21,7 @@ export async function openTelemetry() {
   await work("", async () => {
     await save();
     now.state = await api.get("api/telemetry");
-    if (page.telemetry) now.check = await api.job(await api.send("api/telemetry/check"), told);
+    if (page.telemetry) now.check = await api.job(await api.send("api/telemetry/check"), tellWork);
     else now.check = null;
   });
 }
@@ -38,7 +39,7 @@ async function work(text, act) {
   draw();
 }
 
-function told(state) {
+function tellWork(state) {
   const line = byId("telemetry-working");
   if (line) line.textContent = `${state.state === "waiting" ? "waiting" : state.stage || now.working} · ${Math.round(state.seconds)} s`;
 }
@@ -57,7 +58,7 @@ async function look() {
   const { file, address, table, timezone, step } = now.source;
   const source = { file: address ? "" : file, address, table, timezone: timezone ?? page.draft.site.timezone, step: step ? Number(step) : null };
   now.picked = null;
-  await api.job(await api.send("api/telemetry/look", source), told);
+  await api.job(await api.send("api/telemetry/look", source), tellWork);
   now.state = await api.get("api/telemetry");
 }
 
@@ -76,7 +77,7 @@ async function correct(column, changes) {
 }
 
 const take = () => work("Putting it into the case", async () => {
-  now.check = await api.job(await api.send("api/telemetry/take"), told);
+  now.check = await api.job(await api.send("api/telemetry/take"), tellWork);
   now.state = await api.get("api/telemetry");
   now.picked = null;
   await reloadVerdict();
@@ -119,7 +120,7 @@ function sourcePart() {
       field("Time zone of stamps without offset", timezone),
       field("Steps to average over", choice(STEPS, source.step, { id: "telemetry-step", disabled: off(), onchange: set("step") })),
       el("button", { type: "button", id: "telemetry-read", disabled: off() || !(source.address || name), onclick: () => { if (!source.file) source.file = known; work("Reading", look); } }, name ? `Read ${name}` : "Read"))),
-    now.trouble && el("p", { class: "message", role: "alert" }, now.trouble),
+    now.trouble && el("p", { class: "message", role: "alert" }, told(now.trouble)),
     now.working && el("div", { class: "working" }, el("p", { id: "telemetry-working", role: "status", "aria-live": "polite" }, now.working), el("progress")),
   ];
 }
@@ -177,15 +178,15 @@ function casePart() {
   const odd = new Set(check.anomalies.flatMap((a) => a.columns)), worst = check.anomalies.filter((a) => a.severity !== "remark");
   const isOdd = (row) => odd.has(row.column) || Object.keys(row.flaws).length > 0, notes = check.anomalies.length - worst.length;
   const points = [...check.points].sort((a, b) => isOdd(b) - isOdd(a));
-  const told = [worst.length ? `${worst.length} ${worst.length > 1 ? "findings are" : "finding is"} worth a look` : "", notes ? `${notes} ${notes > 1 ? "notes on single points stand" : "note on a single point stands"} first in the list below` : ""];
+  const found = [worst.length ? `${worst.length} ${worst.length > 1 ? "findings are" : "finding is"} worth a look` : "", notes ? `${notes} ${notes > 1 ? "notes on single points stand" : "note on a single point stands"} first in the list below` : ""];
   const heard = taken?.file === page.telemetry ? [`from ${taken.where}${taken.left_out ? `, ${taken.left_out} columns left out` : ""}`, ...taken.remarks, ...(taken.unmatched_heat.length ? [`left out, though they tell of heat: ${taken.unmatched_heat.join(", ")}`] : [])] : [];
-  const rowOf = (row) => el("tr", {}, nameCell(row, "case"), el("td", {}, spark(row)), el("td", {}, row.meaning), el("td", { class: "n" }, row.lowest === null ? "–" : `${short(row.lowest)} to ${short(row.highest)} ${row.unit}`),
-    el("td", { class: "n" }, `${Math.floor(1000 * row.usable_share) / 10} %`), el("td", { class: "soft" }, [...Object.entries(row.flaws).map(([kind, n]) => `${n} × ${kind}`), ...check.anomalies.filter((a) => a.columns.includes(row.column)).map((a) => a.what)].join("; ")));
+  const rowOf = (row) => el("tr", {}, nameCell(row, "case"), el("td", {}, spark(row)), el("td", {}, row.meaning), el("td", { class: "n" }, row.lowest === null ? "–" : `${short(shown(row.lowest, row.unit))} to ${short(shown(row.highest, row.unit))} ${unitOf(row.unit)}`),
+    el("td", { class: "n" }, `${Math.floor(1000 * row.usable_share) / 10} %`), el("td", { class: "soft" }, [...Object.entries(row.flaws).map(([kind, n]) => `${n} × ${kind}`), ...check.anomalies.filter((a) => a.columns.includes(row.column)).map((a) => told(a.what))].join("; ")));
   return el("section", {},
     el("h3", {}, `In the case: ${check.points.length} points, ${check.start.slice(0, 10)} to ${check.end.slice(0, 10)}, every ${check.step / 60} minutes`),
-    el("p", { class: check.fit ? "" : "message", id: "telemetry-verdict" }, check.fit ? `${["Nothing speaks against a calibration", ...told].filter(Boolean).join("; ")}.` : "A calibration makes no sense with this telemetry:"),
-    worst.length > 0 && el("ul", { class: "findings" }, worst.slice(0, 40).map((a) => el("li", { class: a.severity === "error" ? "error" : "remark" }, el("button", { type: "button", onclick: () => a.columns[0] && pick(a.columns[0], "case") }, el("strong", {}, a.kind), el("span", {}, `${a.what} (${a.certainty}); ${a.advice}`))))),
-    (heard.length > 0 || check.remarks.length > 0) && el("details", {}, el("summary", {}, `${heard.length + check.remarks.length} remarks`), el("ul", {}, [...heard, ...check.remarks].map((text) => el("li", {}, text)))),
+    el("p", { class: check.fit ? "" : "message", id: "telemetry-verdict" }, check.fit ? `${["Nothing speaks against a calibration", ...found].filter(Boolean).join("; ")}.` : "A calibration makes no sense with this telemetry:"),
+    worst.length > 0 && el("ul", { class: "findings" }, worst.slice(0, 40).map((a) => el("li", { class: a.severity === "error" ? "error" : "remark" }, el("button", { type: "button", onclick: () => a.columns[0] && pick(a.columns[0], "case") }, el("strong", {}, a.kind), el("span", {}, told(`${a.what} (${a.certainty}); ${a.advice}`)))))),
+    (heard.length > 0 || check.remarks.length > 0) && el("details", {}, el("summary", {}, `${heard.length + check.remarks.length} remarks`), el("ul", {}, [...heard, ...check.remarks].map((text) => el("li", {}, told(text))))),
     el("div", { class: "row" }, ["calibrate", "diagnose"].filter((kind) => page.reports.includes(kind)).map((kind) => el("button", { type: "button", id: `telemetry-${kind}`, class: now.state?.table && !isTaken() ? "" : "primary", disabled: now.working !== "" || !check.fit, onclick: async () => { await openReports(); await makeReport(kind); } }, `${kind === "calibrate" ? "Calibrate" : "Diagnose"} now`))),
     rowsPart("case", points, [["all", "all points", () => true], ["odd", "with findings", isOdd]], ["point", "values", "what it is", "range", "usable", "found"], rowOf));
 }
