@@ -130,7 +130,8 @@ class ModelEnvironment(gymnasium.Env[np.ndarray, np.ndarray]):
         on = self.view.allowed(bool(action[0] > 0.0), self._on, self._since)
         k, nodes, step = self._k, self.model.box.capacity.size, self.model.step
         a = self.ahead
-        given = [[a.outdoor[k]], a.sun[k], a.gain[k] + self._state[nodes:], a.prices[k], [0.0, 1.0]]
+        gain, ends = a.gain[k] + self._state[nodes:], [0.0, 1.0]
+        given = [[a.outdoor[k]], a.sun[k], gain, a.prices[k], ends, a.beyond[k].ravel()]
         following, cost = self.problem.stage.step(self._state[:nodes], [float(on)], np.concatenate(given))
         heat = self._state[nodes:] * self._whole.keep
         heat = heat + np.sqrt(self._whole.heat_variance) * self.np_random.normal(size=heat.size)

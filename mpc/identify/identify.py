@@ -89,7 +89,8 @@ def identify(telemetry: PlantTelemetry, machines: Sequence[Machine], progress: P
     loads = _loads(telemetry, machines, data, box)
     signals = data.heat
     bought = {name: telemetry.column(name) for name in CARRIERS if name in telemetry.frame}
-    maps, base = map_machines(machines, loads, signals, bought, _above(telemetry, machines))
+    own = [telemetry.column(m.power) if m.power and m.heat else None for m in machines]
+    maps, base = map_machines(machines, loads, signals, bought, _above(telemetry, machines), own)
     notes = _notes(telemetry, machines, suns)
     model = PlantModel(telemetry.site.name, telemetry.step, box, maps, base)
     return Identified(model, telemetry, data, loads, tuple(errors), split, notes)

@@ -26,6 +26,9 @@ _LEVEL, _SLOPE, _SHAPE, _LENGTH, _READING = 0.2, 0.02, 0.2, 5.0, 0.05
 #: air flow, defrost and ducts take some more. A step's outdoor air is told to half a kelvin [K].
 _SHEET_LEVEL, _SHEET_SHAPE, _TOLD = 0.1, 0.1, 0.5
 
+#: Medians of the fifths of a normal distribution, in standard deviations [-].
+_FIFTHS = np.array([-1.2816, -0.5244, 0.0, 0.5244, 1.2816])
+
 #: Least load that is relied on [-].
 _LEAST = 0.1
 
@@ -44,8 +47,9 @@ class HeatLimit:
         Outdoor air [K] and load [-] of steps at the limit.
     sheet : sequence of tuple of float
         Outdoor air [K], rising, and largest load [-] of a data sheet, on straight lines between them: the mean of the
-        prior. Sheets have edges, where a compressor stops or a resistance comes in: of the loads within the error of an
-        outdoor temperature the least is relied on, and a reading between them says nothing.
+        prior. Sheets have edges, where a compressor stops or a resistance comes in: the mean of the loads within the
+        error of an outdoor temperature is relied on, and a reading between them says nothing. Their least would have a
+        building heated all day for a compressor that may stop at night.
 
     Examples
     --------
@@ -85,14 +89,14 @@ class HeatLimit:
         error : ndarray, shape (n,), or float
             Its standard deviation where it is forecast [K].
         """
-        least: FloatArray = self._near(outdoor, error).min(axis=0)
+        expected: FloatArray = self._near(outdoor, error).mean(axis=0)
         if not self._bins:
-            return least
+            return expected
         at, load = np.array([*self._bins.values()]).T
         own = self._kernel(at, at) + _READING**2 * np.eye(at.size)
         cross, factor = self._kernel(outdoor, at), cho_factor(own)
         near = self._near(at, _TOLD)
-        mean = least + cross @ cho_solve(factor, load - np.clip(load, near.min(axis=0), near.max(axis=0)))
+        mean = expected + cross @ cho_solve(factor, load - np.clip(load, near.min(axis=0), near.max(axis=0)))
         level, slope, shape = self._spreads
         prior = level**2 + (slope * (outdoor - _AT)) ** 2 + shape**2
         variance = prior - np.einsum("ij,ji->i", cross, cho_solve(factor, cross.T))
@@ -103,8 +107,8 @@ class HeatLimit:
         return (_SHEET_LEVEL, 0.0, _SHEET_SHAPE) if self.sheet else (_LEVEL, _SLOPE, _SHAPE)
 
     def _near(self, outdoor: FloatArray, error: FloatArray | float) -> FloatArray:
-        """Give the loads that are expected within the error of outdoor temperatures, shape (5, n) [-]."""
-        return self._mean(outdoor + np.linspace(-1.0, 1.0, 5)[:, None] * np.asarray(error))
+        """Give loads that are equally likely within the error of outdoor temperatures, shape (5, n) [-]."""
+        return self._mean(outdoor + _FIFTHS[:, None] * np.asarray(error))
 
     def _mean(self, outdoor: FloatArray) -> FloatArray:
         """Load that is expected before anything was seen [-]."""

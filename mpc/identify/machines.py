@@ -156,8 +156,9 @@ def find_machines(
         entity = name.rpartition("/")[0]
         role: Role = "setpoint" if name in setpoints else "machine"
         own = [c for c in heats if c.rpartition("/")[0] == entity]
-        power = next((f"{entity}/{p}" for p in _POWERS if f"{entity}/{p}" in columns), "")
         heat = own[0] if own else heats[0] if len(heats) == len(chosen) == 1 else ""
+        beside = (entity, heat.rpartition("/")[0])
+        power = next((f"{e}/{p}" for e in beside if e for p in _POWERS if f"{e}/{p}" in columns), "")
         PlantError.unless(
             heat or power or len(chosen) == 1, f"actuator {name}", f"a sensor {entity}/{HEATING_POWER} or {_POWERS[0]}",
             "none", "add it to `measurements`, so that machines can be told apart",

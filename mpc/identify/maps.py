@@ -9,6 +9,7 @@ from typing import Any, Literal, Self
 import numpy as np
 
 from mpc.errors import PlantError
+from mpc.identify.corrections import OwnPower, PowerCorrection
 from mpc.identify.limits import OUT_OF_REACH, bin_of
 from mpc.identify.machines import Machine
 from thermal._types import BoolArray, FloatArray
@@ -23,6 +24,9 @@ OUTDOOR, EMITTER, PER = 280.15, 303.15, 10.0
 #: Spread of a temperature below which nothing is said of its effect [K].
 _TOLD = 0.5
 
+#: A level up to this is none [-].
+_IDLE = 1e-6
+
 #: Levels of the command that count as one [-].
 _SAME = 0.05
 
@@ -31,6 +35,9 @@ _PARTS, _WORSE = (0.3, 0.5, 0.7), 0.02
 
 #: Steps over which errors of a regression may hang together (Newey and West 1987, doi:10.2307/1913610): an hour.
 _LAGS = 4
+
+#: Range of powers over those of a curve, less 1, that are believed [-].
+_RATIOS = (-0.6, 2.0)
 
 #: Half width of intervals in standard errors: 95 % of a normal distribution.
 _WIDE = 1.96
@@ -108,6 +115,8 @@ class MachineMap:
         Of a setpoint: how far it lies above the zone's air at no load and at full load [K].
     limits : tuple of tuple of float
         Of a setpoint: outdoor air [K] and load [-] of steps at which no more heat was to be had.
+    own : OwnPower or None
+        Of its own sensor of power; None where it has none.
     """
 
     machine: Machine
@@ -116,6 +125,7 @@ class MachineMap:
     powers: Mapping[str, Curve]
     above: tuple[float, float] = (0.0, 0.0)
     limits: tuple[tuple[float, float], ...] = ()
+    own: OwnPower | None = None
 
     def at(self, curve: Curve, u: Any, outdoor: Any, emitter: Any) -> Any:
         """Evaluate at a duty or load, for a controller: duty is a share of the time at full load [W].
@@ -138,6 +148,27 @@ class MachineMap:
         """Outdoor air [K] and largest load [-] of its data sheet; nothing where there is none."""
         full = float(self.at(self.heat, 1.0, OUTDOOR, EMITTER))
         return tuple((outdoor, heat / full) for outdoor, heat in self.machine.capacity)
+
+    def correction(self) -> PowerCorrection:
+        """Make what corrects its power, with what the telemetry that it was identified on says."""
+        return PowerCorrection(() if self.own is None else self.own.readings, self.sheet)
+
+    def ratio(self, power: float, u: float, outdoor: float, emitter: float) -> float:
+        """Power that its own sensor says over that of the curve, less 1 [-]; NaN where nothing tells it.
+
+        Parameters
+        ----------
+        power : float
+            Of the sensor [W].
+        u : float
+            Duty or load [-].
+        outdoor, emitter : float
+            Temperatures [K].
+        """
+        expected = 0.0 if self.own is None else float(self.at(self.own.curve, u, outdoor, emitter))
+        if self.own is None or expected <= 0.0:
+            return np.nan
+        return float(np.clip((power - self.own.idle) / expected - 1.0, *_RATIOS))
 
     @property
     def standing(self) -> float:
@@ -191,8 +222,8 @@ class Loads:
         """
         rows = self.known
         u, emitter, outdoor = self.level[rows, m], self.emitter[rows, m], self.outdoor[rows]
-        found = features_of((u > 1e-6).astype(float), u, outdoor, emitter)
-        running = u > 1e-6
+        found = features_of((u > _IDLE).astype(float), u, outdoor, emitter)
+        running = u > _IDLE
         levels = np.unique(np.round(u[running] / _SAME))
         left_out = {
             "standing": len(levels) < 2,
@@ -260,7 +291,8 @@ def regress(
 
 
 def map_machines(
-    machines: Sequence[Machine], loads: Loads, signals: FloatArray, bought: Mapping[str, FloatArray], above: FloatArray
+    machines: Sequence[Machine], loads: Loads, signals: FloatArray, bought: Mapping[str, FloatArray],
+    above: FloatArray, own: Sequence[FloatArray | None] = (),
 ) -> tuple[tuple[MachineMap, ...], dict[str, float]]:
     """Make the map of each machine.
 
@@ -276,6 +308,8 @@ def map_machines(
         Power of each kind that the plant buys [W].
     above : ndarray, shape (n_time, n_machine)
         How far setpoints lie above the air of their zones [K]; NaN of machines.
+    own : sequence of ndarray or None
+        What each machine's own sensor of power says, shape (n_time,) [W]; None of those without.
 
     Returns
     -------
@@ -285,7 +319,7 @@ def map_machines(
         Power of each kind that no machine explains [W].
     """
     everyone = range(len(machines))
-    stops = [bool((loads.level[:, m] <= 1e-6).any()) for m in everyone]
+    stops = [bool((loads.level[:, m] <= _IDLE).any()) for m in everyone]
     heats = [regress(loads, signals[:, m], [m], base=stops[m])[0][0] for m in everyone]
     powers = {kind: regress(loads, values, everyone) for kind, values in bought.items() if np.ptp(values) > 1.0}
     made = []
@@ -296,7 +330,26 @@ def map_machines(
         else:
             level, over = loads.level[:, m], above[:, m]
             made.append(replace(found, above=_local(level, over), limits=_limits(loads.outdoor, level, over)))
+    made = [
+        found if power is None else _with_own(found, m, loads, power)
+        for m, (found, power) in enumerate(zip(made, own or [None] * len(made), strict=True))
+    ]
     return tuple(made), {kind: base for kind, (_, base) in powers.items()}
+
+
+def _with_own(found: MachineMap, m: int, loads: Loads, power: FloatArray) -> MachineMap:
+    """Add what its own sensor says, and where that lies beside the curve."""
+    (curve,), idle = regress(loads, power, [m], base=bool((loads.level[:, m] <= _IDLE).any()))
+    found = replace(found, own=OwnPower(curve, idle))
+    learned = found.correction()
+    for k in np.flatnonzero(loads.known & np.isfinite(power)):
+        u = float(loads.level[k, m])
+        if found.operation == "duty" and u < 1.0:  # a part load, which is none of its own
+            continue
+        ratio = found.ratio(float(power[k]), u, float(loads.outdoor[k]), float(loads.emitter[k, m]))
+        if np.isfinite(ratio):
+            learned.learn(float(loads.outdoor[k]), u, ratio)
+    return replace(found, own=OwnPower(curve, idle, learned.readings))
 
 
 def _operation(found: MachineMap) -> Operation:

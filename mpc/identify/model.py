@@ -13,6 +13,7 @@ import numpy as np
 from calibration.errors import CalibrationError
 from calibration.grey_box.network import GreyBox
 from mpc.errors import ControlError, MpcError
+from mpc.identify.corrections import OwnPower
 from mpc.identify.machines import Machine
 from mpc.identify.maps import Curve, MachineMap
 from mpc.identify.telemetry import CARRIERS
@@ -20,7 +21,7 @@ from mpc.loop.actuators import Actuator
 from thermal._types import FloatArray
 
 #: File of a model in its folder, and the version of its contents.
-FILE, FORMAT = "model.json", 2
+FILE, FORMAT = "model.json", 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +95,7 @@ class PlantModel:
                 "operation": m.operation, "heat": asdict(m.heat), "above": list(m.above),
                 "limits": [list(pair) for pair in m.limits],
                 "powers": {kind: asdict(curve) for kind, curve in m.powers.items()},
+                "own": None if m.own is None else asdict(m.own),
             }
             for m in self.maps
         ]  # fmt: skip
@@ -134,7 +136,15 @@ def _map_of(entry: Mapping[str, Any]) -> MachineMap:
     )
     powers = {kind: Curve(**curve) for kind, curve in entry["powers"].items()}
     limits = tuple((float(outdoor), float(load)) for outdoor, load in entry["limits"])
-    return MachineMap(machine, entry["operation"], Curve(**entry["heat"]), powers, tuple(entry["above"]), limits)
+    heat, above = Curve(**entry["heat"]), tuple(entry["above"])
+    return MachineMap(machine, entry["operation"], heat, powers, above, limits, _own_of(entry["own"]))
+
+
+def _own_of(entry: Mapping[str, Any] | None) -> OwnPower | None:
+    if entry is None:
+        return None
+    readings = tuple((float(a), float(b), float(c), float(d)) for a, b, c, d in entry["readings"])
+    return OwnPower(Curve(**entry["curve"]), float(entry["idle"]), readings)
 
 
 def read_model(folder: Path) -> PlantModel:

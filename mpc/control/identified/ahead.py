@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mpc.control.identified.beyond import WEIGHTS
 from mpc.identify.model import PlantModel
 from mpc.identify.telemetry import CARRIERS, facade_sun
 from mpc.scenario.forecast import Forecast
@@ -34,6 +35,8 @@ class Ahead:
         Comfort bands [K].
     occupied : ndarray of bool, shape (N, n_zone)
         Whether people are expected.
+    beyond : ndarray, shape (N, n_machine, n_weight)
+        Weights of what machines buy beyond their maps, see `mpc.control.identified.beyond` [W].
     """
 
     outdoor: FloatArray
@@ -43,6 +46,7 @@ class Ahead:
     lower: FloatArray
     upper: FloatArray
     occupied: np.ndarray
+    beyond: FloatArray
 
     @classmethod
     def of(cls, model: PlantModel, forecast: Forecast, location: Location) -> Ahead:
@@ -83,4 +87,5 @@ class Ahead:
             known[OUTDOOR_TEMPERATURE], np.nan_to_num(sun),
             columns(of_zones("internal_gain")) + model.box.parts["constant gain"],
             columns([_PRICES.get(carrier, "") for carrier in CARRIERS]), columns(edges[0]), columns(edges[1]), occupied,
+            np.zeros((len(table), len(model.maps), WEIGHTS)),
         )  # fmt: skip

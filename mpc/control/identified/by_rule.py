@@ -9,6 +9,7 @@ import numpy as np
 from calibration.estimation.state_space import REFERENCE
 from mpc.baselines.plants import DIFFERENCE, LEAD
 from mpc.control.identified.ahead import Ahead
+from mpc.control.identified.beyond import bought
 from mpc.control.identified.problem import IdentifiedProblem
 from mpc.scenario.rates import KILOWATT_HOUR
 from thermal._types import FloatArray
@@ -74,21 +75,24 @@ def estimate_rule(
 def _rule(
     problem: IdentifiedProblem, ahead: Ahead, parameters: FloatArray, start: tuple[FloatArray, FloatArray, FloatArray]
 ) -> tuple[FloatArray, FloatArray]:
-    """States and levels of the rule."""
-    model, step = problem.model, problem.stage.step
-    zones, count, served = model.box.zones, len(ahead.outdoor), model.box.serves
+    """States and levels of the rule, by the matrices of the model: symbols would take most of a controller's time."""
+    model, zones, count, served = problem.model, problem.model.box.zones, len(ahead.outdoor), problem.model.box.serves
+    (transition, drive), m = problem.matrices, len(model.maps)
+    first = 1 + len(model.box.suns)  # of the inputs: outdoor air, suns, heat of the machines, gains
+    heated, others = drive[:, first : first + m], np.delete(drive, np.s_[first : first + m], axis=1)
+    exogenous = np.column_stack([parameters[:, :1] - REFERENCE, parameters[:, 1 : first + len(zones)]]) @ others.T
     near = max(round(LEAD / model.step), 1)
     state, most, runs = start[0], start[1], start[2].astype(bool).copy()
     states, levels = np.empty((count + 1, state.size)), np.zeros((count, len(served)))
     states[0] = state
     for n in range(count):
         edges = ahead.lower[n : n + near].max(axis=0) - REFERENCE
-        rest = np.array(step(state, np.zeros(len(served)), parameters[n])[0]).ravel()
+        rest = transition @ state + exogenous[n]
+        emitter = model.box.emitter(state)
         for k, (found, mine) in enumerate(zip(model.maps, served, strict=True)):
             edge = float(edges[mine].max())
             if found.operation == "setpoint":
-                full = np.eye(len(served))[k]
-                gained = np.array(step(state, full, parameters[n])[0]).ravel() - rest
+                gained = heated[:, k] * problem.heat(k, 1.0, ahead.outdoor[n], emitter[k])
                 idle, wide = found.above[0], found.above[1] - found.above[0]
                 rise = float(gained[: len(zones)][mine].mean()) + wide
                 missing = edge - idle - float(rest[: len(zones)][mine].mean())
@@ -97,7 +101,8 @@ def _rule(
             above = float(state[: len(zones)][mine].min()) - edge
             runs[k] = above < 0.0 or (runs[k] and above <= DIFFERENCE)
             levels[n, k] = most[n, k] * runs[k]
-        state = np.array(step(state, levels[n], parameters[n])[0]).ravel()
+        heat = [problem.heat(k, levels[n, k], ahead.outdoor[n], emitter[k]) for k in range(m)]
+        state = rest + heated @ np.array(heat)
         states[n + 1] = state
     return states, levels
 
@@ -105,6 +110,6 @@ def _rule(
 def _bought(problem: IdentifiedProblem, ahead: Ahead, states: FloatArray, levels: FloatArray) -> tuple[float, float]:
     """Cost [currency] and heat [J] of levels along states."""
     model = problem.model
-    powers = model.bought(states[:-1], levels, ahead.outdoor).sum(axis=1) + model.bought_anyway
+    powers = bought(model, ahead.beyond, states[:-1], levels, ahead.outdoor).sum(axis=1) + model.bought_anyway
     heat = model.box.delivered(model.heat(states[:-1], levels, ahead.outdoor), ahead.outdoor)
     return float((powers * ahead.prices).sum()) * model.step / KILOWATT_HOUR, float(heat.sum()) * model.step

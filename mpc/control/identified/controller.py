@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 
 import numpy as np
 import pandas as pd
 
 from calibration.estimation.state_space import REFERENCE
 from mpc.control.identified.ahead import Ahead
+from mpc.control.identified.beyond import PowerLearner, bought
 from mpc.control.identified.by_rule import RuleEstimate, estimate_rule
 from mpc.control.identified.conformal import AFTER, ConformalBackOff, Guarantee, risen
 from mpc.control.identified.electric import Electric, ElectricNow
@@ -97,8 +99,8 @@ class PlannedAction(dict[str, float]):
     zone, power : ndarray
         Expected at the edges of the steps, shape (N + 1, n_zone) [K], and electricity and other carriers over them,
         shape (N, 2) [W].
-    rule : RuleEstimate or None
-        What the plan and the rule cost over the horizon; None where electricity is decided too.
+    compare : callable or None
+        Makes `rule`; None where electricity is decided too.
     """
 
     def __init__(self, values: Mapping[str, float], stamp: pd.Timestamp, source: str, reasons: tuple[str, ...]) -> None:
@@ -108,7 +110,12 @@ class PlannedAction(dict[str, float]):
         self.solution: StageSolution | None = None
         self.zone: FloatArray = np.empty((0, 0))
         self.power: FloatArray = np.empty((0, 2))
-        self.rule: RuleEstimate | None = None
+        self.compare: Callable[[], RuleEstimate] | None = None
+
+    @cached_property
+    def rule(self) -> RuleEstimate | None:
+        """What the plan and the rule cost over the horizon, made when it is asked for."""
+        return None if self.compare is None else self.compare()
 
 
 class IdentifiedController:
@@ -160,7 +167,7 @@ class IdentifiedController:
         self._plan: StageSolution | None = None
         self._most = max(_AT_ONCE * self.settings.starts, 1.0)
         self._runs = [_Runs(self._most) for _ in model.maps]
-        self._thermostats = Thermostats(model)
+        self._thermostats, self._learner = Thermostats(model), PowerLearner(model)
         self._hold = max(round(self.settings.run / model.step), 1)
         self._back = max(self.settings.starts - self._most, 0.0) * model.step / 86_400.0
         asked = self.settings.guarantee
@@ -197,6 +204,8 @@ class IdentifiedController:
         begin = time.perf_counter()
         ahead = Ahead.of(self.model, forecast, self._location)
         self._observe(measurements, ahead)
+        self._thermostats.expect(ahead.outdoor)
+        ahead = replace(ahead, beyond=self._learner.along(ahead.outdoor, self._thermostats.most(ahead.outdoor)))
         if self._solver is None or self._solver.n_steps != len(ahead.outdoor):
             self._solver = StageSolver(self._problem.stage, len(ahead.outdoor), tolerance=self._tolerance)
             self._plan = None
@@ -223,7 +232,7 @@ class IdentifiedController:
             action.solution = solution
             action.zone = solution.states[:, : len(self.model.box.zones)] + REFERENCE
             action.power = self._powers(solution, ahead)
-            action.rule = self._compared(solution, ahead, on) if self._meter is None else None
+            action.compare = self._compared(solution, ahead, on) if self._meter is None else None
         return action
 
     def _observe(self, measurements: Measurements, ahead: Ahead) -> None:
@@ -234,6 +243,7 @@ class IdentifiedController:
         before, levels = self._before
         outdoor = self._observer.outdoor(measurements, before)
         self._thermostats.learn(measurements, self._observer.zones(measurements), outdoor)
+        self._learner.learn(measurements, levels, outdoor, self._observer.state)
         self._observer.update(measurements, before, levels)
         if self.conformal is not None:
             realised = self._inside(self._observer.zones(measurements) - REFERENCE, before)
@@ -365,15 +375,17 @@ class IdentifiedController:
             return actuator.minimum if value > 0.5 * (low + actuator.minimum) else low
         return float(np.clip(value, low, high))
 
-    def _compared(self, solution: StageSolution, ahead: Ahead, on: FloatArray) -> RuleEstimate:
-        """Hold a plan against the rule on the same model."""
+    def _compared(self, solution: StageSolution, ahead: Ahead, on: FloatArray) -> Callable[[], RuleEstimate]:
+        """Give what holds a plan against the rule on the same model."""
         most = self._thermostats.most(ahead.outdoor)
         free = np.zeros_like(most), np.ones_like(most)
         data = self._problem.data(self._observer.state, ahead, self._kept, self.settings.comfort_price, free)
-        return estimate_rule(self._problem, ahead, data.parameters, (solution.states, solution.decisions), most, on)
+        planned = solution.states, solution.decisions
+        return partial(estimate_rule, self._problem, ahead, data.parameters, planned, most, on)
 
     def _powers(self, solution: StageSolution, ahead: Ahead) -> FloatArray:
         """Give expected electricity and other carriers, shape (N, 2) [W]."""
-        model = self.model
-        bought = model.bought(solution.states[:-1], solution.decisions, ahead.outdoor).sum(axis=1) + model.bought_anyway
-        return np.column_stack([bought[:, 0], bought[:, 1:].sum(axis=1)])
+        model, levels = self.model, solution.decisions
+        powers = bought(model, ahead.beyond, solution.states[:-1], levels, ahead.outdoor).sum(axis=1)
+        powers = powers + model.bought_anyway
+        return np.column_stack([powers[:, 0], powers[:, 1:].sum(axis=1)])

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from mpc.control.identified.ahead import Ahead
+from mpc.control.identified.beyond import bought
 from mpc.control.identified.electric import Electric, ElectricNow
 from mpc.identify.model import PlantModel
 from mpc.loop.plant import Measurements
@@ -73,7 +74,7 @@ class ElectricMeter:
         state : ndarray
             Of the observer [K and W].
         """
-        self._modelled = self.model.bought(state, levels, ahead.outdoor[0])[:, 0]
+        self._modelled = bought(self.model, ahead.beyond[0], state, levels, ahead.outdoor[0])[:, 0]
         power = 0.0 if self.electric.battery is None else self.electric.battery.power
         base = float(self.model.bought_anyway[0])
         self._net = base + power * values.get(self.electric.command, 0.0) - self._generation

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from calibration.estimation.state_space import REFERENCE
 from calibration.grey_box.network import COP_AT, COP_PER
 from mpc.control.identified.ahead import Ahead
+from mpc.control.identified.beyond import WEIGHTS, beyond, carrier_of
 from mpc.control.identified.electric import Electric, ElectricNow, ElectricStage
 from mpc.control.solvers.stages import StageData, StageProblem
 from mpc.identify.maps import EMITTER, OUTDOOR
@@ -35,7 +37,8 @@ class IdentifiedProblem:
 
     Decisions are duties and loads of the machines from 0 to 1, within ends that are parameters of each step, so that
     one of them can be fixed without another problem. Heat and power are the maps at the step's outdoor air and the
-    emitter's temperature at its start. Bands are those of the air nodes.
+    emitter's temperature at its start, power with what `mpc.control.identified.beyond` adds. Bands are those of the
+    air nodes.
 
     Parameters
     ----------
@@ -80,31 +83,51 @@ class IdentifiedProblem:
         return {added.electric.command: added.command(decisions[len(self.model.maps) :])}
 
     @cached_property
-    def _space(self):  # type: ignore[no-untyped-def]
-        return self.model.box.space(self.model.step)
+    def matrices(self) -> tuple[FloatArray, FloatArray]:
+        """A and B."""
+        space = self.model.box.space(self.model.step)
+        return space.transition, space.drive
+
+    def heat(self, k: int, load: Any, outdoor: Any, emitter: Any) -> Any:
+        """Heat of a machine that arrives, with numbers, arrays or symbols [W].
+
+        Parameters
+        ----------
+        k : int
+            Which machine.
+        load : number, array or symbol
+            Duty or load [-].
+        outdoor, emitter : number, array or symbol
+            Temperatures [K].
+        """
+        found = self.model.maps[k]
+        slope = 1.0 + float(self.model.box.slopes[k]) * (outdoor - COP_AT) / COP_PER
+        return found.at(found.heat, load, outdoor, emitter) * slope
 
     @cached_property
     def stage(self) -> StageProblem:
         """The problem of a step."""
-        model, box, space = self.model, self.model.box, self._space
+        model, box = self.model, self.model.box
         nz, ns, m = len(box.zones), len(box.suns), len(model.maps)
-        x, u = ca.SX.sym("x", 4 * nz), ca.SX.sym("u", m)
-        p, added = ca.SX.sym("p", 1 + ns + nz + len(CARRIERS) + 2 * m), self._added
-        outdoor, sun, gain, price, low, high = ca.vertsplit(p, np.cumsum([0, 1, ns, nz, len(CARRIERS), m, m]).tolist())
+        x, u, sizes = ca.SX.sym("x", 4 * nz), ca.SX.sym("u", m), [1, ns, nz, len(CARRIERS), m, m, m * WEIGHTS]
+        p, added = ca.SX.sym("p", sum(sizes)), self._added
+        outdoor, sun, gain, price, low, high, weights = ca.vertsplit(p, np.cumsum([0, *sizes]).tolist())
         chosen = low + (high - low) * u
         emitter = REFERENCE + ca.mtimes(ca.DM(box.emitter_weights.T), x)
         heats, cost, electricity = [], ca.SX(0), ca.SX(model.base.get(CARRIERS[0], 0.0))
         for k, found in enumerate(model.maps):
-            slope = 1.0 + float(box.slopes[k]) * (outdoor - COP_AT) / COP_PER
-            heats.append(found.at(found.heat, chosen[k], outdoor, emitter[k]) * slope)
+            heats.append(self.heat(k, chosen[k], outdoor, emitter[k]))
             for carrier, curve in found.powers.items():
                 power = found.at(curve, chosen[k], outdoor, emitter[k])
+                if found.own is not None and carrier == carrier_of(found):
+                    power += beyond(weights[k * WEIGHTS : (k + 1) * WEIGHTS], chosen[k])
                 if added is not None and carrier == CARRIERS[0]:
                     electricity += power
                 else:
                     cost += price[CARRIERS.index(carrier)] * power
         inputs = ca.vertcat(outdoor - REFERENCE, sun, *heats, gain)
-        following = ca.mtimes(ca.DM(space.transition), x) + ca.mtimes(ca.DM(space.drive), inputs)
+        transition, drive = self.matrices
+        following = ca.mtimes(ca.DM(transition), x) + ca.mtimes(ca.DM(drive), inputs)
         cost, end, banded = cost * model.step / KILOWATT_HOUR, ca.SX(0), x[:nz]
         if added is not None:
             after, paid = added.following(electricity, price[0])
@@ -146,7 +169,8 @@ class IdentifiedProblem:
         nodes, zones = box.capacity.size, len(box.zones)
         keep = box.disturbed(step).keep ** np.arange(count)
         gain = ahead.gain + keep[:, None] * state[nodes:]
-        parameters = np.column_stack([ahead.outdoor, ahead.sun, gain, ahead.prices, *ends])
+        weights = ahead.beyond.reshape(count, -1)
+        parameters = np.column_stack([ahead.outdoor, ahead.sun, gain, ahead.prices, *ends, weights])
         # an edge lies in the bands of the step before and of the step after it; nothing can be done about the first
         wanted = np.minimum(ahead.lower + back_off, ahead.upper - _NARROWEST) - REFERENCE
         lower = np.vstack([wanted[:1], np.maximum(wanted[:-1], wanted[1:]), wanted[-1:]])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from calibration.estimation.state_space import REFERENCE
+from mpc.control.identified.forecast_error import ForecastError
 from mpc.identify.limits import OUT_OF_REACH, HeatLimit
 from mpc.identify.model import PlantModel
 from mpc.loop.plant import Measurements
@@ -15,9 +16,6 @@ _IDLE = 0.02
 
 #: How far past the plan a setpoint is told where all heat is wanted [K]: beyond the difference of a thermostat.
 _PUSH = 0.5
-
-#: Error of forecast outdoor air a day ahead [K], which grows with the root of the time: what weather services reach.
-_FORECAST = 2.0
 
 
 class Thermostats:
@@ -36,6 +34,7 @@ class Thermostats:
         self._model = model
         self._limits = [HeatLimit(found.limits, found.sheet) for found in model.maps]
         self._is_led = np.array([found.operation == "setpoint" for found in model.maps], dtype=bool)
+        self._error = ForecastError(model.step)
         self._told, self._zone = np.full(len(model.maps), np.nan), np.full(len(model.box.zones), np.nan)
         self._served = model.box.serves
 
@@ -47,7 +46,7 @@ class Thermostats:
         outdoor : ndarray, shape (N,)
             Outdoor air that is forecast for the coming steps [K].
         """
-        error = _FORECAST * np.sqrt(np.arange(len(outdoor)) * self._model.step / 86_400.0)
+        error = self._error.ahead(len(outdoor))
         return np.column_stack(
             [
                 limit.at(outdoor, error) if led else np.ones(len(outdoor))
@@ -55,8 +54,18 @@ class Thermostats:
             ]
         )
 
+    def expect(self, outdoor: FloatArray) -> None:
+        """Take a forecast, so that its error is known when its steps have come.
+
+        Parameters
+        ----------
+        outdoor : ndarray, shape (N,)
+            Outdoor air of the coming steps [K].
+        """
+        self._error.made(outdoor)
+
     def learn(self, measurements: Measurements, zone: FloatArray, outdoor: float) -> None:
-        """Take a step that has ended: what was given, where a setpoint was out of reach to its end.
+        """Take a step that has ended: how it was forecast, and what was given where a setpoint was out of reach.
 
         Parameters
         ----------
@@ -67,6 +76,7 @@ class Thermostats:
         outdoor : float
             Outdoor air over the step [K].
         """
+        self._error.came(outdoor)
         end = zone + 0.5 * np.nan_to_num(np.maximum(zone - self._zone, 0.0))
         self._zone = zone
         for k in np.flatnonzero(self._is_led & np.isfinite(self._told)):
