@@ -109,8 +109,8 @@ class Diagnosis(Result):
     band_factors : mapping of str to float
         What the filter's deviation is multiplied by for bands of its predictions, by zone [-].
     left_over : Regular or None
-        What comes back of the final model's errors, where the drawing does not hold and effects were sought about a
-        free structure: `settings` then is of that one.
+        What comes back of the final model's errors, where the verdict hangs on it: where the drawing does not hold, or
+        an effect was accepted and much is left.
     correction : Correction or None
         The baseline with heat of unknown cause, where no effect explains what is missing and such heat is certified.
     faults : tuple of Fault
@@ -148,6 +148,11 @@ class Diagnosis(Result):
     def final(self) -> Fit:
         """Model with all accepted effects."""
         return self.rounds[-1].after
+
+    @property
+    def drawing_fails(self) -> bool:
+        """Whether the drawing does not hold, so that effects were sought about a free structure."""
+        return self.settings.structure.lumped
 
     @property
     def taken(self) -> Fit:
@@ -332,7 +337,7 @@ def diagnose(
         settings=replace(models.settings, normalisation=models.drivers.normalisation), horizon=horizon,
         last_third=found.last_third, rungs=rungs, better=better, prediction=prediction,
         estimated=found.case.estimated, disturbance=disturbance, band_factors=factors,
-        left_over=None if found.free is None else found.free.left_over, correction=correction, faults=found.faults,
+        left_over=found.left_over, correction=correction, faults=found.faults,
     )  # fmt: skip
 
 

@@ -18,9 +18,10 @@ from calibration.diagnosis.refit.comparison import ModelComparison
 from calibration.diagnosis.refit.how_far import Step, how_far
 from calibration.diagnosis.refit.refit import HeldOut, elsewhere, held_out
 from calibration.diagnosis.refit.search import Round, search
+from calibration.diagnosis.screen.regular import Regular, regular
 from calibration.evaluation.intervals import Interval
 from calibration.evaluation.settings import ModelSettings
-from calibration.fit.fitted_case import FittedCase
+from calibration.fit.fitted_case import FittedCase, is_large
 from calibration.fit.ladder import ADVANCE
 from calibration.fit.left_out import LeftOut
 from calibration.fit.result import Rung
@@ -71,6 +72,9 @@ class Sought:
         Where the verdict needed them: something was found missing.
     free : Free or None
         What was sought about a free structure, where the drawing does not hold.
+    left_over : Regular or None
+        What comes back of the errors of the last model, about a free structure, and where it decides whether an effect
+        that was accepted is named.
     faults : tuple of Fault
         Of the telemetry, which were mended before anything else.
     last_third : float or None
@@ -87,6 +91,7 @@ class Sought:
     floor: HeldOut
     structures: Structures | None
     free: Free | None
+    left_over: Regular | None
     faults: tuple[Fault, ...]
     last_third: float | None
     seconds: float = field(compare=False)
@@ -195,11 +200,13 @@ def seek(
             free = search_free(models, structures.kept, known, ruled_out, whole.part(0.6, "free structure"))
             models, rounds, untestable, left_over = free.models, free.rounds, free.untestable, free.left_over
             structures = structures._replace(kept=free.kept)
+        elif about_drawing == "unexplained" and rounds[0].accepted and not is_large(case.building.zone_names):
+            left_over = regular(models, rounds[-1].after)
     steps, floor = how_far(models, rounds)
     verdict = doubted(judge(rounds, untestable, left_over), {s.effects[-1] for s in steps if s.void})
     if free is not None and structures is not None:
         verdict = with_recurring(verdict, free, structures.rungs)
     return Sought(
-        case, models, rounds, with_faults(verdict, faults), steps, floor, structures, free, faults,
-        first.mae if turns else None, time.process_time() - began,
+        case, models, rounds, with_faults(verdict, faults), steps, floor, structures, free, left_over,
+        faults, first.mae if turns else None, time.process_time() - began,
     )  # fmt: skip

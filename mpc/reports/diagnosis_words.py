@@ -50,7 +50,7 @@ def diagnosis_verdict(result: Diagnosis) -> str:
             " Slabs and furniture have values of each zone's own here: they explain what looked like another effect "
             "while all zones shared one."
         )
-    if result.better is not None and result.left_over is None:
+    if result.better is not None and not result.drawing_fails:
         own, beside = next(r.left_out_mae for r in result.rungs if r.chosen), result.rungs[0].left_out_mae
         text += (
             f" For prediction and control take the building {structure_words(result.rungs)}, which calibration.json "

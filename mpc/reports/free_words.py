@@ -21,7 +21,7 @@ def free_sentence(result: Diagnosis) -> str:
     result : Diagnosis
         From `diagnose`.
     """
-    if result.left_over is None:
+    if not result.drawing_fails:
         return ""
     others = [r for r in result.rungs if r.name != CORRECTED]
     best = min(others, key=lambda r: r.left_out_mae)
@@ -65,5 +65,5 @@ def known_effects(result: Diagnosis) -> list[str]:
     result : Diagnosis
         From `diagnose`.
     """
-    moved = result.left_over is not None and any(r.chosen and r.name == "shifted" for r in result.rungs)
+    moved = result.drawing_fails and any(r.chosen and r.name == "shifted" for r in result.rungs)
     return [e for e in result.rounds[0].before.effects if not (moved and e == CLOCK)]

@@ -18,6 +18,7 @@ from calibration.diagnosis.refit.refit import ACCEPTED, CHANCE, Refit, Work, bey
 from calibration.diagnosis.refit.repeat import DISAGREE, Repeats, agreement
 from calibration.diagnosis.refit.search import _first
 from calibration.diagnosis.screen.gains import MATTERS
+from calibration.diagnosis.screen.regular import Regular
 from calibration.diagnosis.screen.screen import Screening
 from calibration.diagnosis.seek import seek
 from calibration.evaluation.settings import ModelSettings
@@ -209,6 +210,10 @@ def test_what_explains_a_part_of_large_errors_is_not_named() -> None:
     assert [v.name for v in verdicts] == ["unexplained", "named"]
     assert verdicts[0].candidates[0].probability == pytest.approx(0.5, abs=0.01)
     assert verdicts[1].candidates[0].probability > 0.99
+    half_left = replace(rounds[0], refits=(), accepted=replace(accepted, fit=half)), replace(r, before=half)
+    chance = Regular(fall=0.0, sure=0.0, explains=0.0, shares={})  # the half that is left is another one every day
+    comes_back = Regular(fall=0.3, sure=5.0, explains=0.5, shares={})
+    assert [judge(half_left, {}, left).name for left in (chance, comes_back)] == ["named", "unexplained"]
 
 
 def test_telemetry_is_shifted_only_by_more_than_one_of_its_steps() -> None:

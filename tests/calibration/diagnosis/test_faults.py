@@ -1,4 +1,4 @@
-"""Faults of the telemetry that it shows itself: mended where days that are left out are predicted better for it."""
+"""Faults of the telemetry that it shows itself: mended where certain, or where left-out days are predicted better."""
 
 from dataclasses import replace
 from functools import cache
@@ -14,6 +14,7 @@ from calibration.diagnosis.diagnosis import Diagnosis
 from calibration.diagnosis.faults import Errors, Fault, mend, suspected, with_faults
 from mpc.reports.correction_words import faults_sentence
 from thermal import Case
+from thermal.case.plausibility.anomaly import Certainty
 from thermal.data import load_bundled_case
 
 SETTINGS = {"dx": 2.0, "horizon": "6h"}
@@ -65,8 +66,12 @@ def test_nothing_is_mended_where_nothing_is_wrong() -> None:
     assert mend(load_bundled_case(), (), (), SETTINGS) == ()
 
 
-def test_what_predicts_no_better_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("certainty", "mended"), [("certain", True), ("likely", False)])
+def test_what_is_likely_only_must_predict_better(
+    monkeypatch: pytest.MonkeyPatch, certainty: Certainty, mended: bool
+) -> None:
     errors = iter([(1.0, 1.1), (0.97, 1.0)])
+    (seen,) = (replace(f, seen=replace(f.seen, certainty=certainty)) for f in suspected(late()))
 
     def calibrated(*_: object, **__: object) -> object:
         left, held = next(errors)
@@ -76,7 +81,9 @@ def test_what_predicts_no_better_is_left_alone(monkeypatch: pytest.MonkeyPatch) 
         )
 
     monkeypatch.setattr("calibration.diagnosis.faults.calibrate", calibrated)
-    assert mend(late(), (), (), SETTINGS) == ()
+    monkeypatch.setattr("calibration.diagnosis.faults.suspected", lambda case: [seen])
+    found = mend(late(), (), (), SETTINGS)
+    assert [f.before.held_out for f in found] == [1.1] * mended
 
 
 def test_a_fault_comes_first_and_is_named() -> None:
