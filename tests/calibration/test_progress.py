@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 
 from calibration import calibrate
 from calibration.diagnosis.diagnosis import diagnose
 from calibration.progress import USUAL_ITERATIONS, WHOLE, Forward, count_iterations
-from thermal import Case, Telemetry, load_bundled_case
+from thermal import Case, load_case
 from thermal.effects.catalogue import CATALOGUE
 
 Told = list[tuple[str, int, int]]
 
 
 @pytest.fixture
-def case() -> Case:
-    """The bundled case in half hours, which take as many steps of a fit."""
-    found = load_bundled_case()
-    frame = found.telemetry.frame.resample("30min", closed="right", label="right").mean()
-    return replace(found, telemetry=Telemetry.from_frame(frame), judged=None)
+def case(bundled_case_in: Callable[[str], Path]) -> Case:
+    return load_case(bundled_case_in("30min"))
 
 
 def shares(told: Told) -> list[float]:

@@ -1,6 +1,8 @@
 """Heat that follows from dampers and valves is fitted about as well as metered heat, and their sizes are found."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,19 +10,15 @@ import pytest
 from calibration import calibrate
 from calibration.fit.result import CalibrationResult
 from thermal.case.case import Case
+from thermal.case.load import load_case
 from thermal.case.plan import zone_sizes
-from thermal.case.telemetry import Telemetry
-from thermal.data import load_bundled_case
 
 LUMPED = {"starts": 1, "structure": {"lumped": True, "sun": True}}
 
 
 @pytest.fixture(scope="module")
-def metered() -> Case:
-    """The bundled case in quarters of an hour, which are fitted in half the time."""
-    found = load_bundled_case()
-    frame = found.telemetry.frame.resample("15min", closed="right", label="right").mean()
-    return replace(found, telemetry=Telemetry.from_frame(frame), judged=None)
+def metered(bundled_case_in: Callable[[str], Path]) -> Case:
+    return load_case(bundled_case_in("15min"))
 
 
 @pytest.fixture(scope="module")
