@@ -82,7 +82,7 @@ class Page:
         from thermal.plan.page.desk import LabelDesk
         from thermal.plan.page.draft import draft_of
 
-        self.desk = LabelDesk(folder, makers={"check": lambda case, out, progress: progress("checking", 0, 1)})
+        self.desk = LabelDesk(folder, makers={"check": lambda case, out, progress, units: progress("checking", 0, 1)})
         self.client = _client(serve.create_app(self.desk, "t"))
         draft = json.loads(draft_of(load_building(folder)).model_dump_json(by_alias=True))
         (self.desk.store.own / "drawings" / "codes.csv").write_bytes(codes)
@@ -172,7 +172,8 @@ class TelemetryPage:
             ("GET", "/t/api/telemetry/plot?column={}&of=table", None), ("GET", "/t/api/telemetry", None),
             ("GET", "/t/api/places?name={}", None), ("GET", "/t/api/jobs/{}", None),
             ("POST", "/t/api/jobs/{}/stop", None), ("POST", "/t/api/reports/{}", None),
-            ("POST", "/t/api/reports/check", None), ("POST", "/t/api/telemetry/files?window=w&name={}", b"a,b\n1,2\n"),
+            ("POST", "/t/api/reports/check?units=ip", None), ("POST", "/t/api/reports/check?units={}", None),
+            ("POST", "/t/api/telemetry/files?window=w&name={}", b"a,b\n1,2\n"),
         ]  # fmt: skip
 
     def ask(self, rng: np.random.Generator) -> None:
@@ -199,7 +200,7 @@ class TelemetryPage:
         self.desk.end()
 
 
-def _report(case: Path, out: Path, progress: Callable[[str, int, int], None]) -> None:
+def _report(case: Path, out: Path, progress: Callable[[str, int, int], None], units: str) -> None:
     """Make a report in no time."""
     progress("checking", 1, 0)
     out.mkdir(parents=True, exist_ok=True)
