@@ -175,6 +175,8 @@ class MachineMap:
     def ratio(self, power: float, u: float, outdoor: float, emitter: float) -> float:
         """Power that its own sensor says over that of the curve, less 1 [-]; NaN where nothing tells it.
 
+        Of a machine that is run at full load or not at all a part load is none of its own.
+
         Parameters
         ----------
         power : float
@@ -184,6 +186,8 @@ class MachineMap:
         outdoor, emitter : float
             Temperatures [K].
         """
+        if self.operation == "duty" and u < 1.0:
+            return np.nan
         if self.own is None or (expected := float(self.at(self.own.curve, u, outdoor, emitter))) <= 0.0:
             return np.nan
         return float(np.clip((power - self.own.idle) / expected - 1.0, *_RATIOS))
@@ -363,7 +367,7 @@ def _with_own(found: MachineMap, m: int, loads: Loads, power: FloatArray) -> Mac
     for k in np.flatnonzero(loads.known & np.isfinite(power)):
         u = float(loads.level[k, m])
         ratio = found.ratio(float(power[k]), u, float(loads.outdoor[k]), float(loads.emitter[k, m]))
-        if np.isfinite(ratio) and (found.operation != "duty" or u >= 1.0):  # a part load is none of its own
+        if np.isfinite(ratio):
             learned.learn(float(loads.outdoor[k]), u, ratio)
     return replace(found, own=OwnPower(curve, idle, learned.readings))
 

@@ -107,8 +107,6 @@ class PowerLearner:
             if found.operation == "setpoint":  # its zone's own controller chose the load
                 full = float(found.at(found.heat, 1.0, outdoor, emitter[k]))
                 load = measurements[machine.heat] / full if machine.heat in measurements else np.nan
-            if found.operation == "duty" and load < 1.0:
-                continue
             ratio = found.ratio(measurements[machine.power], load, outdoor, float(emitter[k]))
             if np.isfinite(load) and np.isfinite(ratio):
                 correction.learn(outdoor, load, ratio)
