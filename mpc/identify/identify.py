@@ -11,8 +11,9 @@ from calibration.grey_box.fit import GreyBoxData, fit_grey_box, follow
 from calibration.grey_box.judge import LeadError, judge
 from calibration.grey_box.network import GreyBox
 from mpc.errors import PlantError
+from mpc.identify.curves import EMITTER
 from mpc.identify.machines import Machine
-from mpc.identify.maps import EMITTER, Loads, map_machines
+from mpc.identify.maps import Loads, map_machines
 from mpc.identify.model import PlantModel
 from mpc.identify.telemetry import CARRIERS, SET, PlantTelemetry
 from thermal._types import FloatArray

@@ -13,8 +13,9 @@ import numpy as np
 from calibration.errors import CalibrationError
 from calibration.grey_box.network import GreyBox
 from mpc.errors import ControlError, MpcError
+from mpc.identify.curves import Curve
 from mpc.identify.machines import Machine
-from mpc.identify.maps import Curve, MachineMap, OwnPower
+from mpc.identify.maps import MachineMap, OwnPower
 from mpc.identify.telemetry import CARRIERS
 from mpc.loop.actuators import Actuator
 from thermal._types import FloatArray

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from calibration.results import Content
+from mpc.identify.curves import EMITTER, OUTDOOR, interval_of
 from mpc.identify.identify import Identified
-from mpc.identify.maps import EMITTER, OUTDOOR, interval_of
 from mpc.identify.model import FILE, PlantModel
 from mpc.kpi.kpis import Kpis, measure_kpis
 from mpc.reports.display import write_results

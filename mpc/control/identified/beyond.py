@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from mpc.identify.corrections import PowerCorrection
-from mpc.identify.maps import EMITTER, MachineMap
+from mpc.identify.curves import EMITTER
+from mpc.identify.maps import MachineMap
 from mpc.identify.model import PlantModel
 from mpc.identify.telemetry import CARRIERS
 from mpc.loop.plant import Measurements

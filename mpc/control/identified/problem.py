@@ -15,7 +15,7 @@ from mpc.control.identified.ahead import Ahead
 from mpc.control.identified.beyond import WEIGHTS, beyond, carrier_of
 from mpc.control.identified.electric import Electric, ElectricNow, ElectricStage
 from mpc.control.solvers.stages import StageData, StageProblem
-from mpc.identify.maps import EMITTER, OUTDOOR
+from mpc.identify.curves import EMITTER, OUTDOOR
 from mpc.identify.model import PlantModel
 from mpc.identify.telemetry import CARRIERS
 from mpc.scenario.rates import HOUR, KILOWATT_HOUR

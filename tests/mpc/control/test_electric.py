@@ -18,8 +18,9 @@ from mpc.control.identified.electric import Electric, ElectricNow, Photovoltaic
 from mpc.control.identified.problem import SCALE, IdentifiedProblem
 from mpc.control.solvers.stages import StageSolution, StageSolver
 from mpc.errors import ControlError
+from mpc.identify.curves import Curve
 from mpc.identify.machines import Machine
-from mpc.identify.maps import Curve, MachineMap
+from mpc.identify.maps import MachineMap
 from mpc.identify.model import PlantModel
 from mpc.loop.actuators import Actuator
 from mpc.loop.plant import Measurements, PointLayout

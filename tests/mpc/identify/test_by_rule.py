@@ -11,8 +11,9 @@ from calibration.grey_box.network import GreyBox
 from mpc.control.identified.by_rule import _bought, _rule, estimate_rule
 from mpc.control.identified.controller import IdentifiedController, IdentifiedSettings
 from mpc.control.identified.problem import Ahead, IdentifiedProblem
+from mpc.identify.curves import Curve
 from mpc.identify.machines import Machine
-from mpc.identify.maps import Curve, MachineMap
+from mpc.identify.maps import MachineMap
 from mpc.identify.model import PlantModel
 from mpc.loop.actuators import HEATING_SETPOINT, Actuator
 from mpc.loop.plant import Measurements, PointLayout

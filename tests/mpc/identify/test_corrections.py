@@ -10,8 +10,9 @@ import pytest
 from calibration.grey_box.network import GreyBox
 from mpc.control.identified.beyond import KNOTS, PowerLearner, beyond, weights_of
 from mpc.identify.corrections import PowerCorrection
+from mpc.identify.curves import Curve
 from mpc.identify.machines import Machine
-from mpc.identify.maps import Curve, Loads, MachineMap, OwnPower, map_machines
+from mpc.identify.maps import Loads, MachineMap, OwnPower, map_machines
 from mpc.identify.model import PlantModel
 from mpc.loop.actuators import HEATING_SETPOINT, Actuator
 from mpc.loop.plant import Measurements, PointLayout

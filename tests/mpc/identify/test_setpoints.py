@@ -13,9 +13,10 @@ from calibration.grey_box.network import GreyBox
 from mpc.control.identified.controller import IdentifiedController, IdentifiedSettings
 from mpc.control.identified.thermostats import Thermostats
 from mpc.errors import PlantError
+from mpc.identify.curves import Curve
 from mpc.identify.limits import HeatLimit
 from mpc.identify.machines import Machine, find_machines
-from mpc.identify.maps import Curve, Loads, MachineMap, map_machines
+from mpc.identify.maps import Loads, MachineMap, map_machines
 from mpc.identify.model import PlantModel
 from mpc.loop.actuators import HEATING_SETPOINT, Actuator
 from mpc.loop.plant import Measurements, PointLayout
