@@ -1,6 +1,7 @@
 """Sun's place and irradiance on tilted planes, by pvlib, at the middle of each step."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import pandas as pd
@@ -31,6 +32,8 @@ _BY_RANGE, _DARK, _CLEAR = 0.175, 0.25, 0.75
 _NORMAL = "direct_normal_irradiance_sensor"
 _DIFFUSE = "diffuse_horizontal_irradiance_sensor"
 _GLOBAL = "global_horizontal_irradiance_sensor"
+
+_DAY = 86_400 * 10**9  # ns
 
 
 def incidence_modifier(cosine: FloatArray) -> FloatArray:
@@ -192,9 +195,32 @@ def estimated_sun(location: Location, stamps: pd.DatetimeIndex, step: float, out
 
 def _place(location: Location, middle: pd.DatetimeIndex) -> tuple[FloatArray, FloatArray]:
     """Azimuth and altitude of the sun [deg]."""
+    stamps = middle.as_unit("ns").asi8
+    steps = np.unique(np.diff(stamps))
+    if len(steps) != 1 or steps[0] <= 0 or _DAY % steps[0]:
+        return _positions(location, middle)
+    # whole days that are kept: a controller's next forecast is the last one, a step later
+    step, first, last = int(steps[0]), int(stamps[0]), int(stamps[-1])
+    days = [_of_day(location, day, first % step, step) for day in range(first // _DAY, last // _DAY + 1)]
+    begin = (first - first // _DAY * _DAY) // step
+    azimuth, altitude = np.hstack(days)[:, begin : begin + len(stamps)]
+    return azimuth, altitude
+
+
+@lru_cache(maxsize=1024)
+def _of_day(location: Location, day: int, offset: int, step: int) -> FloatArray:
+    """Azimuth and altitude along a day of UTC, at an offset and then every step [ns], shape (2, n) [deg]."""
+    stamps = pd.to_datetime(np.arange(day * _DAY + offset, (day + 1) * _DAY, step), utc=True)
+    found = np.stack(_positions(location, stamps))
+    found.flags.writeable = False
+    return found
+
+
+def _positions(location: Location, stamps: pd.DatetimeIndex) -> tuple[FloatArray, FloatArray]:
+    """Azimuth and altitude of the sun, without what is kept [deg]."""
     from pvlib import solarposition
 
-    place = solarposition.get_solarposition(middle, location.latitude, location.longitude, location.elevation)
+    place = solarposition.get_solarposition(stamps, location.latitude, location.longitude, location.elevation)
     return place["azimuth"].to_numpy(dtype=float), place["elevation"].to_numpy(dtype=float)
 
 

@@ -126,9 +126,7 @@ class PowerLearner:
         return np.stack([weights_of(found, learned, outdoor, most[:, k]) for k, (found, learned) in maps], axis=1)
 
 
-def weights_of(
-    found: MachineMap, correction: PowerCorrection, outdoor: FloatArray, most: FloatArray
-) -> FloatArray:
+def weights_of(found: MachineMap, correction: PowerCorrection, outdoor: FloatArray, most: FloatArray) -> FloatArray:
     """Weights of a machine's power beyond its map, shape (N, `WEIGHTS`) [W].
 
     With them power is the largest convex one that is nowhere above the corrected map: what lies above it is avoided by
@@ -155,19 +153,29 @@ def weights_of(
         return weights
     mapped = np.column_stack([found.at(found.own.curve, u, outdoor, EMITTER) for u in KNOTS])
     ratio = correction.at(outdoor, np.minimum(KNOTS, most[:, None]))
-    lacking = np.array([_convex(row) for row in mapped * (1.0 + ratio)]) - mapped
+    lacking = _convex(mapped * (1.0 + ratio)) - mapped
     slopes = np.diff(lacking, axis=1) / np.diff(KNOTS)
     return np.column_stack([slopes[:, 0], np.diff(slopes, axis=1)])
 
 
+def _interpolations() -> tuple[FloatArray, np.ndarray]:
+    """Weights of all straight lines between two knots at each knot between them, and where each knot's begin."""
+    at, begin = list[FloatArray](), list[int]()
+    for j, u in enumerate(KNOTS):
+        begin.append(len(at))
+        for i in range(j + 1):
+            for k in range(max(j, i), len(KNOTS)):
+                line = np.zeros(len(KNOTS))
+                share = (u - KNOTS[i]) / (KNOTS[k] - KNOTS[i]) if k > i else 0.0
+                line[i] += 1.0 - share
+                line[k] += share
+                at.append(line)
+    return np.array(at).T, np.array(begin)
+
+
+_LINES, _FIRST = _interpolations()
+
+
 def _convex(values: FloatArray) -> FloatArray:
-    """Largest convex function at the knots that is nowhere above values there."""
-    hull = [0]
-    for k in range(1, len(KNOTS)):
-        while len(hull) > 1:
-            i, j = hull[-2:]
-            if (values[j] - values[i]) * (KNOTS[k] - KNOTS[i]) < (values[k] - values[i]) * (KNOTS[j] - KNOTS[i]):
-                break
-            hull.pop()
-        hull.append(k)
-    return np.asarray(np.interp(KNOTS, KNOTS[hull], values[hull]))
+    """Largest convex function at the knots that is nowhere above values there, row by row."""
+    return np.asarray(np.minimum.reduceat(values @ _LINES, _FIRST, axis=1))
