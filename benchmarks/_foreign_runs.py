@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pandas as pd
@@ -18,6 +18,7 @@ from foreign_models.plants import PLANTS, write_plant
 
 from mpc.adapters.energyplus.input import weather_path
 from mpc.baselines.plants import LEAD, FullSpeed, OwnControl
+from mpc.control.identified.conformal import ConformalBackOff
 from mpc.control.identified.controller import IdentifiedSettings
 from mpc.errors import ControlError
 from mpc.identify.excitation import ExcitationSettings
@@ -72,17 +73,42 @@ class Timed:
         return chosen
 
 
+def settings_of(controller: str) -> tuple[str, IdentifiedSettings | None]:
+    """Read a controller's name: one of `CONTROLLERS`, and the settings that ``mpc price P`` or ``mpc edge B`` tell.
+
+    Parameters
+    ----------
+    controller : str
+        With a price of discomfort [currency/K/h] or a distance from the lower edges [K], which is then kept as it is.
+    """
+    kind, _, told = controller.partition(" price ")
+    if told:
+        return kind, IdentifiedSettings(comfort_price=float(told), guarantee=None)
+    kind, _, told = controller.partition(" edge ")
+    return kind, IdentifiedSettings(back_off=float(told), guarantee=None) if told else None
+
+
 def run(name: str, which: str, controller: str, out: Path) -> dict[str, Any]:
     """Let a controller run a plant in its ``coldest`` or ``typical`` period; optimal control is identified first."""
     begin = pd.Timestamp(starts(weather_path(PLANTS[name].weather))[which])
-    loop, scenario, timed, spent = drive(name, controller, out, begin, DAYS)
+    kind, settings = settings_of(controller)
+    loop, scenario, timed, spent = drive(name, kind, out, begin, DAYS, settings)
     return account(loop, scenario, timed.seconds) | spent
 
 
 def drive(
-    name: str, controller: str, out: Path, begin: pd.Timestamp, days: int, settings: IdentifiedSettings | None = None
-) -> tuple[ClosedLoopRun, Scenario, Timed, dict[str, Any]]:
-    """Close the loop for some days: the run, its scenario, the timed controller, and what a model took."""
+    name: str, controller: str, out: Path, begin: pd.Timestamp, days: int, settings: IdentifiedSettings | None = None,
+    kept: list[list[float]] | None = None,
+) -> tuple[ClosedLoopRun, Scenario, Timed, dict[str, Any]]:  # fmt: skip
+    """Close the loop for some days: the run, its scenario, the timed controller, and what a model took.
+
+    Parameters
+    ----------
+    name, controller, out, begin, days, settings
+        Plant, one of `CONTROLLERS`, folder, first day, length [d] and settings of optimal control.
+    kept : list of list of float, optional
+        Back-off of a run before that this one goes on from, see `ConformalBackOff` [K].
+    """
     perfect = controller == "mpc perfect"
     folder = out / ("plants_foreseen" if perfect else "plants")
     path = write_plant(name, folder, "none" if perfect else "day_ahead")
@@ -93,8 +119,17 @@ def drive(
     study = PlantStudy(path, start=first, end=last, model=model, settings=settings or IdentifiedSettings())
     with study.plant() as plant:
         timed = Timed(CONTROLLERS[controller](study, plant))
+        if kept is not None:
+            conformal_of(timed).values = np.array(kept)
         loop, seen = run_recorded(plant, timed, study.site)
         return loop, study.scenario(plant, seen), timed, spent
+
+
+def conformal_of(timed: Timed) -> ConformalBackOff:
+    """Back-off of optimal control that keeps a share."""
+    found = getattr(timed.controller, "conformal", None)
+    ControlError.unless(isinstance(found, ConformalBackOff), "controller", "one with a guarantee", type(found).__name__)
+    return cast(ConformalBackOff, found)
 
 
 def identified(name: str, out: Path) -> tuple[PlantModel, dict[str, Any]]:

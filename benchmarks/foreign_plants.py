@@ -10,6 +10,8 @@ the coldest and in a typical period of its place, after a week under its own con
 - *pi*: a PI to the speed of a machine that has one;
 - *mpc*: the library's, after an experiment of two weeks beside the coldest period (``identify``, then ``control``),
   with weather forecasts that are wrong as day-ahead ones are; *mpc perfect*: the same with the weather that comes;
+- *mpc price P*, *mpc edge B* (``--prices``, ``--edges``): as *mpc*, but a kelvin hour below the band counts P rather
+  than 10, or the lower edges are moved by B: what optimal control costs at the comfort of a rule;
 - *do-mpc*: as *mpc*, every problem solved by do-mpc (extra ``[benchmarks]``), some ten minutes of CPU a run;
 - *sac*: a policy trained on the model that *mpc* has (extra ``[rl]``), of a plant whose machine is run whole.
 
@@ -41,6 +43,9 @@ TITLES = {
     "mpc": "MPC, identified", "mpc perfect": "the same, weather known",
     "do-mpc": "the same, solved by do-mpc", "sac": "SAC, trained on the same model",
 }  # fmt: skip
+_TOLD = {
+    "mpc price": "MPC, a kelvin hour below counts {:g} EUR", "mpc edge": "MPC, lower edge moved by {:g} K",
+}  # fmt: skip
 COLUMNS = ("plant", "period", "controller", "cost, EUR/m²", "against own, %", "below the band, K h a zone",
            "above, K h a zone", "time below, h a zone", "starts a day", "CPU, s")  # fmt: skip
 
@@ -50,6 +55,12 @@ def wanted(name: str, controllers: list[str]) -> list[str]:
     told = PLANTS[name].description()
     has_speed = any(entry.get("kind") == "modulating" for entry in told["actuators"].values())
     return [each for each in controllers if each not in ("pi", "sac") or has_speed]
+
+
+def title_of(controller: str) -> str:
+    """Words of a controller."""
+    kind, _, told = controller.rpartition(" ")
+    return _TOLD[kind].format(float(told)) if kind in _TOLD else TITLES[controller]
 
 
 def file_of(name: str, which: str, controller: str, out: Path) -> Path:
@@ -81,7 +92,7 @@ def table_of(runs: list[dict[str, Any]]) -> str:
     own = {(r["plant"], r["period"]): r["cost"] for r in runs if r["controller"] == "own" and "cost" in r}
     rows = []
     for row in runs:
-        head = (row["plant"], row["period"], TITLES[row["controller"]])
+        head = (row["plant"], row["period"], title_of(row["controller"]))
         if "failure" in row:
             rows.append((*head, f"failed: {row['failure']}", *[""] * (len(COLUMNS) - 4)))
             continue
@@ -101,14 +112,17 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--plants", nargs="+", default=list(PLANTS), choices=list(PLANTS))
     parser.add_argument("--periods", nargs="+", default=list(PERIODS), choices=list(PERIODS))
     parser.add_argument("--controllers", nargs="+", default=list(CONTROLLERS), choices=list(CONTROLLERS))
+    parser.add_argument("--prices", nargs="+", type=float, default=[], help="of discomfort, for rows beside [EUR/K/h]")
+    parser.add_argument("--edges", nargs="+", type=float, default=[], help="moves of the lower edges, the same [K]")
     parser.add_argument("--finished", action="store_true", help="lay out the runs that are there, without new ones")
     parser.add_argument("--publish", action="store_true", help="replace the table between its marks")
     options = parser.parse_args(arguments)
+    told = [f"mpc price {p:g}" for p in options.prices] + [f"mpc edge {b:g}" for b in options.edges]
     runs = []
     try:
         for name in options.plants:
             for which in options.periods:
-                for controller in wanted(name, options.controllers):
+                for controller in wanted(name, options.controllers + told):
                     if options.finished and not file_of(name, which, controller, options.out).exists():
                         continue
                     runs.append(perform(name, which, controller, options.out))

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
@@ -51,6 +51,10 @@ class StudyOptions:
         value("Share of occupied steps below the band that is kept, such as 5%, or none; of a plant.yaml.", "P"),
     ] = "1%"
     starts: Annotated[int, value("Most starts of a machine in 24 hours; of a plant.yaml.")] = 10
+    runs: Annotated[
+        str,
+        value("How runs of whole machines are planned: dithering, or mixed_integer by HiGHS; of a plant.yaml.", "HOW"),
+    ] = "dithering"
     parameters: Annotated[str | None, file("calibration.json of this case; default: before calibration.")] = None
     controller_parameters: Annotated[
         Path | None,
@@ -102,13 +106,13 @@ class StudyOptions:
 
     def _described(self) -> PlantStudy:
         from mpc.control.identified.conformal import Guarantee
-        from mpc.control.identified.controller import IdentifiedSettings
+        from mpc.control.identified.controller import IdentifiedSettings, RunPlanning
         from mpc.identify.model import read_model
         from mpc.studies.described import PlantStudy
 
         asked = self.violations
         guarantee = None if asked == "none" else Guarantee(share(asked, "--violations"))
-        settings = IdentifiedSettings(starts=self.starts, guarantee=guarantee)
+        settings = IdentifiedSettings(starts=self.starts, guarantee=guarantee, runs=cast(RunPlanning, self.runs))
         if self.comfort_price is not None:
             settings = replace(settings, comfort_price=self.comfort_price)
         model = None if self.model is None else read_model(self.model)

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
+from typing import Literal, get_args
 
 import numpy as np
 import pandas as pd
@@ -17,6 +18,7 @@ from mpc.control.identified.by_rule import RuleEstimate, estimate_rule
 from mpc.control.identified.conformal import AFTER, ConformalBackOff, Guarantee, risen
 from mpc.control.identified.electric import Electric, ElectricNow
 from mpc.control.identified.meter import ElectricMeter
+from mpc.control.identified.mixed_integer import WHOLE, RunLimits, RunPlanner
 from mpc.control.identified.observer import GreyBoxObserver
 from mpc.control.identified.problem import SCALE, IdentifiedProblem
 from mpc.control.identified.thermostats import Thermostats
@@ -41,6 +43,9 @@ _EXACT, _LINEAR = 1e-6, 1e-3
 #: A duty above this is a run [-].
 _HALF = 0.5
 
+#: How machines that are run whole are planned.
+RunPlanning = Literal["dithering", "mixed_integer"]
+
 
 @dataclass(frozen=True)
 class IdentifiedSettings:
@@ -61,6 +66,14 @@ class IdentifiedSettings:
         Shortest run and shortest rest of a machine [s].
     guarantee : Guarantee or None
         Share of violations that is kept; None keeps the back-off as it is.
+    runs : str
+        How machines that are run whole are planned: ``dithering`` decides the next run or rest and leaves later steps
+        relaxed, ``mixed_integer`` decides those of the next six hours at once by HiGHS.
+
+    Raises
+    ------
+    ControlError
+        When the way of planning runs is not known.
     """
 
     comfort_price: float = 10.0
@@ -69,6 +82,10 @@ class IdentifiedSettings:
     starts: int = 10
     run: float = 1800.0
     guarantee: Guarantee | None = field(default_factory=Guarantee)
+    runs: RunPlanning = "dithering"
+
+    def __post_init__(self) -> None:
+        ControlError.unless_known(self.runs, get_args(RunPlanning), "mpc: runs", "a way of planning them")
 
 
 @dataclass
@@ -160,6 +177,7 @@ class IdentifiedController:
         self.model, self.settings, self._location = model, settings or IdentifiedSettings(), location
         self._actuators = {a.name: a for a in actuators}
         self._problem, self._observer = IdentifiedProblem(model, electric), GreyBoxObserver(model)
+        self._planner = RunPlanner(self._problem.stage, round(WHOLE / model.step))
         self._meter = None if electric is None else ElectricMeter(electric, model)
         self._tolerance = _EXACT if electric is None else _LINEAR
         self._solver: StageSolver | None = None
@@ -266,6 +284,10 @@ class IdentifiedController:
         low, high = np.zeros((count, m)), self._thermostats.most(ahead.outdoor)
         best: StageSolution | None = None
         whole = [k for k, found in enumerate(self.model.maps) if found.operation == "duty"]
+        if whole and self.settings.runs == "mixed_integer":
+            best = self._mixed(ahead, whole, (low, high))
+            if best is not None:
+                return best
         for k in whole:
             choices = []
             for on in self._possible(k):
@@ -279,6 +301,27 @@ class IdentifiedController:
             _, on, steps, best = min(choices, key=lambda c: c[0])
             low[:1, k] = high[:1, k] = float(on)
         return best if whole else self._solve(ahead, (low, high))
+
+    def _mixed(self, ahead: Ahead, whole: list[int], ends: tuple[FloatArray, FloatArray]) -> StageSolution | None:
+        """Plan the runs of the coming hours by HiGHS about the relaxed plan, then the rest with these runs."""
+        relaxed = self._solve(ahead, ends)
+        if relaxed is None:
+            return None
+        limits = []
+        for k in whole:
+            runs = self._runs[k]
+            bound, price = max(self._hold - runs.since, 0), SCALE * self.settings.start_price
+            limits.append(RunLimits(k, runs.on, bound, self._hold, runs.left, self._back, price))
+        data = self._problem.data(self._observer.state, ahead, self._kept, self.settings.comfort_price, ends, self._now)
+        # loads as the problem counts them, within their ends; those of machines that are run whole are from 0 to 1
+        shares, m = relaxed.decisions.copy(), len(self.model.maps)
+        shares[:, :m] = np.divide(shares[:, :m], ends[1], out=np.zeros_like(ends[1]), where=ends[1] > 0.0)
+        chosen = self._planner.plan(data, relaxed.states, shares, limits)
+        if chosen is None:
+            return None
+        low, high = ends[0].copy(), ends[1].copy()
+        low[: len(chosen), whole] = high[: len(chosen), whole] = chosen
+        return self._solve(ahead, (low, high))
 
     def _possible(self, k: int) -> tuple[bool, ...]:
         """Whether a machine may be on or off next, by run times and the limit of starts."""
