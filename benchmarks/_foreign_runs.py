@@ -14,7 +14,7 @@ import pandas as pd
 from _foreign_do_mpc import DoMpcController
 from _foreign_rules import ProportionalIntegral
 from foreign_models.periods import DAYS, starts
-from foreign_models.plants import PLANTS, write_plant
+from foreign_models.plants import ALL, write_plant
 
 from mpc.adapters.energyplus.input import weather_path
 from mpc.baselines.plants import LEAD, FullSpeed, OwnControl
@@ -90,7 +90,7 @@ def settings_of(controller: str) -> tuple[str, IdentifiedSettings | None]:
 
 def run(name: str, which: str, controller: str, out: Path) -> dict[str, Any]:
     """Let a controller run a plant in its ``coldest`` or ``typical`` period; optimal control is identified first."""
-    begin = pd.Timestamp(starts(weather_path(PLANTS[name].weather))[which])
+    begin = pd.Timestamp(starts(weather_path(ALL[name].weather))[which])
     kind, settings = settings_of(controller)
     loop, scenario, timed, spent = drive(name, kind, out, begin, DAYS, settings)
     return account(loop, scenario, timed.seconds) | spent

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from energyplus_trials.frame import Objects
@@ -48,16 +49,17 @@ FLATS = {
 ALL_DAY = [True] * 24
 
 
-def flats() -> Objects:
-    """Return the flats' input: a row of three on a middle storey, whose thermostats fall while nobody is in."""
-    model, names = ep.start(FABRIC), list(FLATS)
-    for k, (zone, flat) in enumerate(FLATS.items()):
+def flats(listed: Mapping[str, Flat] | None = None, fabric: ep.Fabric = FABRIC) -> Objects:
+    """Return the flats' input: a row on a middle storey, three by default, with set-back while nobody is in."""
+    listed = listed or FLATS
+    model, names = ep.start(fabric), list(listed)
+    for k, (zone, flat) in enumerate(listed.items()):
         behind = {"floor": "", "ceiling": ""}
         behind |= {"west": names[k - 1]} if k else {}
         behind |= {"east": names[k + 1]} if k + 1 < len(names) else {}
         glass = {"south": 8.0, "north": 4.0}
         ep.merge(model, ep.box(zone, (k * WIDTH, 0.0), (WIDTH, DEPTH, HEIGHT), glass, behind))
-        ep.merge(model, ep.inside(zone, FABRIC, WIDTH * DEPTH, flat.people, f"{zone} presence", flat.appliances))
+        ep.merge(model, ep.inside(zone, fabric, WIDTH * DEPTH, flat.people, f"{zone} presence", flat.appliances))
         ep.merge(model, thermostat(zone, clock(flat.home, cool=_COOL), clock(ALL_DAY)))
         ep.merge(model, ep.equipment(zone, [("ZoneHVAC:Baseboard:RadiantConvective:Electric", f"{zone} baseboard")]))
         ep.merge(model, {
@@ -75,10 +77,10 @@ def flats() -> Objects:
     return model
 
 
-def description() -> dict[str, Any]:
+def description(listed: Mapping[str, Flat] | None = None) -> dict[str, Any]:
     """Return what ``plant.yaml`` says of zones, points and actuators."""
     told: dict[str, Any] = {"zones": {}, "measurements": {}, "actuators": {}, "energy": {"electricity": []}}
-    for zone, flat in FLATS.items():
+    for zone, flat in (listed or FLATS).items():
         name, power = zone.lower(), f"{zone} baseboard, Baseboard Electricity Rate"
         told["zones"][name] = {
             "temperature": f"{zone}, Zone Mean Air Temperature", "floor_area": WIDTH * DEPTH,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 from energyplus_trials.frame import Objects
@@ -11,19 +12,17 @@ from foreign_models.heat_pump import HeatPump, heat_pump
 from foreign_models.water import water_loop
 
 ZONE, PUMP, FLOOR = "HOUSE", "HEAT PUMP", "HEATED FLOOR"
-LENGTH, WIDTH, HEIGHT = 16.0, 12.0, 2.7  # m: 192 m2, as BOPTEST's house with a heat pump
 FABRIC = ep.Fabric(wall=0.12, roof=0.20, floor=0.12, glass=(1.3, 0.55), air_changes=0.25)
-#: At -16 degC, the coldest hour, it gives 6 kW, about what the house then needs.
+#: At -16 degC, the coldest hour, it gives 6 kW, about what the house of the table then needs.
 MACHINE = HeatPump(capacity=12_000.0, cop=4.2)
-FLOW = 4.8e-4  # m3/s: 6 K of spread at full capacity
 CIRCULATOR = 60.0  # W, of the heated floor's pump
-PEOPLE, APPLIANCES = 5.0, 250.0  # W of appliances that nothing measures
 #: Share of the people that is in, by hour: out from 7 to 20 h on working days, as in BOPTEST's house.
 HOME = [1.0] * 7 + [0.0] * 13 + [1.0] * 4
 WEEKEND = [1.0] * 24
 #: Own control: setpoints, the lower one from 7 to 16 h on working days [degC], gain [1/K] and reset time [h] of a PI.
 SETPOINTS, GAIN, RESET = (21.3, 19.0), 0.6, 6.0
-_PIPES = 300.0 * LENGTH * WIDTH / 45.0  # m: at 0.15 m
+_SPREAD = 4e-8  # m3/s of water per W: 6 K at full capacity
+_PIPES = 300.0 / 45.0  # m per m2: at 0.15 m
 
 _CONTROL = """
 SET lack = wanted - room
@@ -63,28 +62,67 @@ SET load = speed * flowing * share * {capacity}
 """
 
 
-def house() -> Objects:
-    """Return the house's input.
+@dataclass(frozen=True)
+class House:
+    """What a house is made of.
+
+    Parameters
+    ----------
+    fabric : Fabric
+        Of the building.
+    length, width, height : float
+        Inside [m]; 192 m2 as BOPTEST's house with a heat pump.
+    south : float
+        Glass to the south, of which each other side has a quarter [m2].
+    machine : HeatPump
+        That heats the floor.
+    people, appliances : float
+        Number, and heat of appliances that nothing measures [W].
+    """
+
+    fabric: ep.Fabric = FABRIC
+    length: float = 16.0
+    width: float = 12.0
+    height: float = 2.7
+    south: float = 16.0
+    machine: HeatPump = MACHINE
+    people: float = 5.0
+    appliances: float = 250.0
+
+    @property
+    def area(self) -> float:
+        """Floor area [m2]."""
+        return self.length * self.width
+
+    @property
+    def flow(self) -> float:
+        """Of the water [m3/s]."""
+        return _SPREAD * self.machine.capacity
+
+
+def house(of: House | None = None) -> Objects:
+    """Return the input of a house, by default of the one in the table.
 
     The compressor's speed is a share of the capacity at hand, the pump is on or off, and both are told by schedules
     that say ``OWN`` unless they are overwritten: then a PI on the operative temperature runs the compressor, and the
     pump with it. The machine's curves see the water that left it in the step before.
     """
-    model = ep.start(FABRIC)
-    area = LENGTH * WIDTH
+    of = of or House()
+    model, side = ep.start(of.fabric), of.south / 4.0
     parts: list[Any] = [
-        ep.box(ZONE, (0.0, 0.0), (LENGTH, WIDTH, HEIGHT), {"south": 16.0, "east": 4.0, "west": 4.0, "north": 4.0}),
-        ep.inside(ZONE, FABRIC, area, PEOPLE, "presence", APPLIANCES),
-        heat_pump(PUMP, MACHINE, FLOW),
+        ep.box(ZONE, (0.0, 0.0), (of.length, of.width, of.height),
+               {"south": of.south, "east": side, "west": side, "north": side}),
+        ep.inside(ZONE, of.fabric, of.area, of.people, "presence", of.appliances),
+        heat_pump(PUMP, of.machine, of.flow),
         water_loop(
-            "FLOOR LOOP", {"design_flow_rate": FLOW, "design_pump_head": 30_000.0, "motor_efficiency": 0.5,
+            "FLOOR LOOP", {"design_flow_rate": of.flow, "design_pump_head": 30_000.0, "motor_efficiency": 0.5,
                            "design_power_consumption": CIRCULATOR, "pump_control_type": "Intermittent",
                            "fraction_of_motor_inefficiencies_to_fluid_stream": 0.5},
             ("HeatPump:PlantLoop:EIR:Heating", PUMP), [("ZoneHVAC:LowTemperatureRadiant:VariableFlow", FLOOR)],
-            ("PlantEquipmentOperation:UserDefined", "dispatch"), FLOW,
+            ("PlantEquipmentOperation:UserDefined", "dispatch"), of.flow,
         ),
         ep.equipment(ZONE, [("ZoneHVAC:LowTemperatureRadiant:VariableFlow", FLOOR)]),
-        _floor(), _control(),
+        _floor(of), _control(of),
     ]  # fmt: skip
     for part in parts:
         ep.merge(model, part)
@@ -92,8 +130,8 @@ def house() -> Objects:
     return model
 
 
-def _floor() -> Objects:
-    layers = [(0.15, 1.6, 2300.0, 1000.0), (FABRIC.floor, 0.035, 30.0, 1400.0), (0.04, 1.4, 2000.0, 1000.0),
+def _floor(of: House) -> Objects:
+    layers = [(0.15, 1.6, 2300.0, 1000.0), (of.fabric.floor, 0.035, 30.0, 1400.0), (0.04, 1.4, 2000.0, 1000.0),
               (0.04, 1.4, 2000.0, 1000.0), (0.012, 1.0, 2000.0, 800.0)]  # fmt: skip
     return ep.construction("heated floor", layers) | {
         "ConstructionProperty:InternalHeatSource": {"pipes": {
@@ -108,19 +146,20 @@ def _floor() -> Objects:
         }},
         "ZoneHVAC:LowTemperatureRadiant:VariableFlow": {FLOOR: {
             "design_object": "floor design", "availability_schedule_name": ep.ALWAYS, "zone_name": ZONE,
-            "surface_name_or_radiant_surface_group_name": f"{ZONE} floor", "hydronic_tubing_length": round(_PIPES, 1),
-            "heating_design_capacity": 20_000.0, "maximum_hot_water_flow": FLOW, "cooling_design_capacity": 0.0,
+            "surface_name_or_radiant_surface_group_name": f"{ZONE} floor",
+            "hydronic_tubing_length": round(_PIPES * of.area, 1),
+            "heating_design_capacity": 20_000.0, "maximum_hot_water_flow": of.flow, "cooling_design_capacity": 0.0,
             "heating_water_inlet_node_name": f"{FLOOR} in", "heating_water_outlet_node_name": f"{FLOOR} out",
             "number_of_circuits": "CalculateFromCircuitLength", "circuit_length": 100.0,
         }},
     }  # fmt: skip
 
 
-def _control() -> Objects:
+def _control(of: House) -> Objects:
     warm, cool = SETPOINTS
     told = {
-        "gain": GAIN, "reset": RESET, "minimum": MACHINE.minimum, "on": MACHINE.minimum + 0.05,
-        "off": MACHINE.minimum - 0.1, "capacity": MACHINE.capacity,
+        "gain": GAIN, "reset": RESET, "minimum": of.machine.minimum,
+        "on": of.machine.minimum + 0.05, "off": of.machine.minimum - 0.1, "capacity": of.machine.capacity,
     }  # fmt: skip
     found: Objects = {
         "Schedule:Constant": {
@@ -164,16 +203,17 @@ def _control() -> Objects:
     return found
 
 
-def description() -> dict[str, Any]:
+def description(of: House | None = None) -> dict[str, Any]:
     """Return what ``plant.yaml`` says of zones, points and actuators."""
+    of = of or House()
     lower = {day: [21.0 if h else 16.0 for h in hours] for day, hours in (("weekday", HOME), ("weekend", WEEKEND))}
     upper = {day: [24.0 if h else 30.0 for h in hours] for day, hours in (("weekday", HOME), ("weekend", WEEKEND))}
     power, circulator = f"{PUMP}, Heat Pump Electricity Rate", "FLOOR LOOP pump, Pump Electricity Rate"
     return {
         "zones": {"house": {
-            "temperature": f"{ZONE}, Zone Operative Temperature", "floor_area": LENGTH * WIDTH,
-            "volume": LENGTH * WIDTH * HEIGHT, "comfort": {"lower": _degrees(lower), "upper": _degrees(upper)},
-            "people": {day: [PEOPLE * h for h in hours] for day, hours in (("weekday", HOME), ("weekend", WEEKEND))},
+            "temperature": f"{ZONE}, Zone Operative Temperature", "floor_area": of.area,
+            "volume": of.area * of.height, "comfort": {"lower": _degrees(lower), "upper": _degrees(upper)},
+            "people": {day: [of.people * h for h in hours] for day, hours in (("weekday", HOME), ("weekend", WEEKEND))},
         }},
         "measurements": {
             "house/zone_air_temperature_sensor": f"{ZONE}, Zone Operative Temperature",
@@ -188,7 +228,7 @@ def description() -> dict[str, Any]:
         "actuators": {
             "heat_pump/compressor_speed": {
                 "signal": "COMPRESSOR SPEED, Schedule:Constant, Schedule Value", "range": [0.0, 1.0],
-                "kind": "modulating", "minimum": MACHINE.minimum,
+                "kind": "modulating", "minimum": of.machine.minimum,
             },
             "floor/pump": {
                 "signal": "PUMP STATE, Schedule:Constant, Schedule Value", "range": [0.0, 1.0], "kind": "on_off",

@@ -14,6 +14,7 @@ import yaml
 from energyplus_trials.frame import STEPS_PER_HOUR, Objects
 
 from foreign_models import flats, house, office, shop
+from foreign_models.drawn import drawn_plants
 from foreign_models.periods import DAYS, WARM_UP, starts
 from foreign_models.prices import dynamic_prices
 from mpc.adapters.energyplus.input import weather_path
@@ -65,6 +66,9 @@ PLANTS = {
     "shop": ForeignPlant("Shop of 216 m2 with a unitary heat pump of 24 kW", shop.shop, shop.description),
 }
 
+#: Those of the table, and twelve that are drawn.
+ALL = PLANTS | {name: ForeignPlant(*told) for name, told in drawn_plants().items()}
+
 
 def describe(name: str, errors: str = "day_ahead") -> dict[str, Any]:
     """Return the ``plant.yaml`` of a plant, in the coldest two weeks.
@@ -72,11 +76,11 @@ def describe(name: str, errors: str = "day_ahead") -> dict[str, Any]:
     Parameters
     ----------
     name : str
-        One of `PLANTS`.
+        One of `ALL`.
     errors : str
         Of its weather forecasts: ``day_ahead`` or ``none``.
     """
-    plant = PLANTS[name]
+    plant = ALL[name]
     weather = weather_path(plant.weather)
     place = read_epw(weather).location
     told = plant.description()
@@ -105,7 +109,7 @@ def write_plant(name: str, out: Path, errors: str = "day_ahead") -> Path:
     Parameters
     ----------
     name : str
-        One of `PLANTS`.
+        One of `ALL`.
     out : Path
         Where folders of plants are; that of this one is made anew.
     errors : str
@@ -119,7 +123,7 @@ def write_plant(name: str, out: Path, errors: str = "day_ahead") -> Path:
     told, folder = describe(name, errors), out / name
     folder.mkdir(parents=True, exist_ok=True)
     prices = dynamic_prices(told["location"]["timezone"]).to_csv(index=False)
-    _whole(folder / f"{name}.epJSON", json.dumps(PLANTS[name].model(), indent=1))
+    _whole(folder / f"{name}.epJSON", json.dumps(ALL[name].model(), indent=1))
     _whole(folder / "prices.csv", prices)
     _whole(folder / "plant.yaml", yaml.safe_dump(told, sort_keys=False, width=120, default_flow_style=None))
     return folder / "plant.yaml"

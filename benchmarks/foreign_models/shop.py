@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 from energyplus_trials.frame import Objects
@@ -12,40 +13,87 @@ from mpc.adapters.energyplus.input import InputFile, building_path, read_input
 
 ZONE, UNIT = "SHOP", "HEAT PUMP"
 FABRIC = ep.Fabric(wall=0.06, roof=0.10, floor=0.05, glass=(2.2, 0.45), air_changes=0.5, heavy=False, goods=3.0)
-LENGTH, DEPTH, HEIGHT = 18.0, 12.0, 3.6  # m
-PEOPLE, APPLIANCES = 8.0, 600.0  # W, of lights and tills that nothing measures
-#: Capacity at 8.3 degC outdoors [W], and air [m3/s], 5 m3/s per 100 kW: usual of packaged units.
-CAPACITY, AIR = 24_000.0, 1.2
-RESISTANCE = 8_000.0  # W, below the outdoor temperature up to which it is let in
-_LET_IN = -5.0  # degC
-_FAN = (250.0, 0.5)  # Pa, and total efficiency [-]: 600 W
+_LET_IN = -5.0  # degC, outdoor air up to which the resistance is let in
+_FAN = (250.0, 0.5)  # Pa, and total efficiency [-]: 600 W at 1.2 m3/s
+_FLOW = 0.05  # m3/s of air per kW: usual of packaged units
 #: Whose compressor curves the unit has.
 SOURCE = "ASHRAE901_OfficeSmall_STD2019_Denver"
-WEEKDAY = [8 <= hour < 20 for hour in range(24)]
-WEEKEND = [9 <= hour < 18 for hour in range(24)]
 _HEATING, _COOLING = "Coil:Heating:DX:SingleSpeed", "Coil:Cooling:DX:SingleSpeed"
 
 
-def shop() -> Objects:
-    """Return the shop's input."""
-    model = ep.start(FABRIC)
+@dataclass(frozen=True)
+class Shop:
+    """What a shop is made of.
+
+    Parameters
+    ----------
+    fabric : Fabric
+        Of the building.
+    length, depth, height : float
+        Inside [m].
+    glass : float
+        To the south [m2].
+    people, appliances : float
+        Customers and staff, and heat of lights and tills that nothing measures [W].
+    capacity, resistance : float
+        Of the compressor at 8.3 degC outdoors, and of what is let in below `_LET_IN` [W].
+    opens : tuple of int
+        Hours from which and until which it is open on working days; at week-ends from an hour later to two earlier.
+    """
+
+    fabric: ep.Fabric = FABRIC
+    length: float = 18.0
+    depth: float = 12.0
+    height: float = 3.6
+    glass: float = 22.0
+    people: float = 8.0
+    appliances: float = 600.0
+    capacity: float = 24_000.0
+    resistance: float = 8_000.0
+    opens: tuple[int, int] = (8, 20)
+
+    @property
+    def air(self) -> float:
+        """Of the fan [m3/s]."""
+        return _FLOW * self.capacity / 1e3
+
+    @property
+    def area(self) -> float:
+        """Floor area [m2]."""
+        return self.length * self.depth
+
+    @property
+    def weekday(self) -> list[bool]:
+        """Whether it is open on working days, by hour."""
+        return [self.opens[0] <= hour < self.opens[1] for hour in range(24)]
+
+    @property
+    def weekend(self) -> list[bool]:
+        """Whether it is open at week-ends, by hour."""
+        return [self.opens[0] + 1 <= hour < self.opens[1] - 2 for hour in range(24)]
+
+
+def shop(of: Shop | None = None) -> Objects:
+    """Return the input of a shop, by default of the one in the table."""
+    of = of or Shop()
+    model = ep.start(of.fabric)
     parts: list[Any] = [
-        ep.box(ZONE, (0.0, 0.0), (LENGTH, DEPTH, HEIGHT), {"south": 22.0}, {"east": "", "west": ""}),
-        ep.inside(ZONE, FABRIC, LENGTH * DEPTH, PEOPLE, "presence", APPLIANCES),
-        thermostat(ZONE, clock(WEEKDAY), clock(WEEKEND), cooled=True),
+        ep.box(ZONE, (0.0, 0.0), (of.length, of.depth, of.height), {"south": of.glass}, {"east": "", "west": ""}),
+        ep.inside(ZONE, of.fabric, of.area, of.people, "presence", of.appliances),
+        thermostat(ZONE, clock(of.weekday), clock(of.weekend), cooled=True),
         ep.equipment(ZONE, [("AirLoopHVAC:UnitarySystem", UNIT)], f"{UNIT} out", f"{UNIT} in"),
-        {"Schedule:Compact": {"presence": ep.daily([float(h) for h in WEEKDAY], [float(h) for h in WEEKEND])}},
-        _unit(), *_coils(),
+        {"Schedule:Compact": {"presence": ep.daily([float(h) for h in of.weekday], [float(h) for h in of.weekend])}},
+        _unit(of), *_coils(of),
     ]  # fmt: skip
     for part in parts:
         ep.merge(model, part)
     return model
 
 
-def _unit() -> Objects:
+def _unit(of: Shop) -> Objects:
     flows: dict[str, Any] = {}
     for mode in ("heating", "cooling"):
-        flows |= {f"{mode}_supply_air_flow_rate": AIR, f"{mode}_supply_air_flow_rate_method": "SupplyAirFlowRate"}
+        flows |= {f"{mode}_supply_air_flow_rate": of.air, f"{mode}_supply_air_flow_rate_method": "SupplyAirFlowRate"}
     return {
         "AirLoopHVAC:UnitarySystem": {UNIT: {
             "control_type": "Load", "controlling_zone_or_thermostat_location": ZONE,
@@ -63,25 +111,25 @@ def _unit() -> Objects:
         "Schedule:Constant": {"fan cycles": ep.constant(0.0)},
         "Fan:OnOff": {f"{UNIT} fan": {
             "availability_schedule_name": ep.ALWAYS, "fan_total_efficiency": _FAN[1], "pressure_rise": _FAN[0],
-            "maximum_flow_rate": AIR, "air_inlet_node_name": f"{UNIT} in", "air_outlet_node_name": f"{UNIT} fan out",
+            "maximum_flow_rate": of.air, "air_inlet_node_name": f"{UNIT} in", "air_outlet_node_name": f"{UNIT} fan out",
         }},
         "Coil:Heating:Electric": {f"{UNIT} resistance": {
-            "nominal_capacity": RESISTANCE, "air_inlet_node_name": f"{UNIT} heating out",
+            "nominal_capacity": of.resistance, "air_inlet_node_name": f"{UNIT} heating out",
             "air_outlet_node_name": f"{UNIT} out",
         }},
         "OutdoorAir:Node": {f"{UNIT} outdoor": {}},
     }  # fmt: skip
 
 
-def _coils() -> list[Objects]:
+def _coils(of: Shop) -> list[Objects]:
     """Coils of a reference building's unit at our size, with all their curves."""
     source = read_input(building_path(SOURCE))
     sizes = {
-        _HEATING: {"gross_rated_heating_capacity": CAPACITY, "rated_air_flow_rate": AIR,
+        _HEATING: {"gross_rated_heating_capacity": of.capacity, "rated_air_flow_rate": of.air,
                    "air_inlet_node_name": f"{UNIT} cooling out", "air_outlet_node_name": f"{UNIT} heating out",
                    "resistive_defrost_heater_capacity": 0.0},
-        _COOLING: {"gross_rated_total_cooling_capacity": CAPACITY, "gross_rated_sensible_heat_ratio": 0.75,
-                   "rated_air_flow_rate": AIR, "air_inlet_node_name": f"{UNIT} fan out",
+        _COOLING: {"gross_rated_total_cooling_capacity": of.capacity, "gross_rated_sensible_heat_ratio": 0.75,
+                   "rated_air_flow_rate": of.air, "air_inlet_node_name": f"{UNIT} fan out",
                    "air_outlet_node_name": f"{UNIT} cooling out", "condenser_air_inlet_node_name": f"{UNIT} outdoor"},
     }  # fmt: skip
     found = []
@@ -98,7 +146,7 @@ def _curve(source: InputFile, name: str) -> Objects:
     return {kind: {title: dict(fields)}}
 
 
-def data_sheet() -> list[list[float | str]]:
+def data_sheet(of: Shop) -> list[list[float | str]]:
     """Return the most heat over outdoor air, as a maker says it [degC, W]: compressor, and resistance below -5 degC."""
     source = read_input(building_path(SOURCE))
     coil = next(iter(source.of_type(_HEATING).values()))
@@ -109,20 +157,21 @@ def data_sheet() -> list[list[float | str]]:
     just = 0.1  # K beside an edge
     found: list[list[float | str]] = []
     for outdoor in (-20.0, stops - just, stops, -10.0, _LET_IN, _LET_IN + just, 0.0, 7.0, 20.0):
-        compressor = CAPACITY * sum(c * outdoor**k for k, c in enumerate(terms)) if outdoor >= stops else 0.0
-        found.append([f"{outdoor:g} degC", round(compressor + RESISTANCE * (outdoor <= _LET_IN), -2)])
+        compressor = of.capacity * sum(c * outdoor**k for k, c in enumerate(terms)) if outdoor >= stops else 0.0
+        found.append([f"{outdoor:g} degC", round(compressor + of.resistance * (outdoor <= _LET_IN), -2)])
     return found
 
 
-def description() -> dict[str, Any]:
+def description(of: Shop | None = None) -> dict[str, Any]:
     """Return what ``plant.yaml`` says of zones, points and actuators."""
+    of = of or Shop()
     measured, acted = thermostat_points(ZONE, "shop")
     power = [f"{UNIT}, Unitary System Electricity Rate"]
     return {
         "zones": {"shop": {
-            "temperature": f"{ZONE}, Zone Mean Air Temperature", "floor_area": LENGTH * DEPTH,
-            "volume": LENGTH * DEPTH * HEIGHT, "comfort": comfort(WEEKDAY, WEEKEND),
-            "people": present(PEOPLE, WEEKDAY, WEEKEND),
+            "temperature": f"{ZONE}, Zone Mean Air Temperature", "floor_area": of.area,
+            "volume": of.area * of.height, "comfort": comfort(of.weekday, of.weekend),
+            "people": present(of.people, of.weekday, of.weekend),
         }},
         "measurements": measured | {
             "heat_pump/electrical_power_sensor": power[0],
@@ -130,6 +179,6 @@ def description() -> dict[str, Any]:
             "heat_pump/heating_power_sensor": f"{UNIT}, Unitary System Total Heating Rate",
             "heat_pump/supply_air_temperature_sensor": f"{UNIT} out, System Node Temperature",
         },
-        "actuators": {name: entry | {"capacity": data_sheet()} for name, entry in acted.items()},
+        "actuators": {name: entry | {"capacity": data_sheet(of)} for name, entry in acted.items()},
         "energy": {"electricity": power},
     }  # fmt: skip

@@ -90,6 +90,25 @@ def test_prices_are_drawn_from_their_seed(models: Callable[[str], ModuleType]) -
     assert by_hour.argmax() == 18 and price.min() > 0.05 and 0.03 < price.std() < 0.06
 
 
+def test_drawn_buildings_are_the_same_again_and_differ(models: Callable[[str], ModuleType]) -> None:
+    drawn = models("drawn")
+    first, again = drawn.drawn_plants(), drawn.drawn_plants()
+    assert [plant.about for plant in first.values()] == [plant.about for plant in again.values()]
+    assert len(first) == 12 and len({plant.about for plant in first.values()}) == 12
+    told = [plant.description() for name, plant in first.items() if name in ("drawn_1", "drawn_2")]
+    assert [list(each["zones"]) for each in told] == [["house"], ["flat_1", "flat_2"]]
+    windows = first["drawn_1"].model()["Window"]
+    assert all(0.0 < window["starting_x_coordinate"] < 8.0 for window in windows.values())
+
+
+def test_settings_of_optimal_control_are_read_from_names(script: Callable[[str], ModuleType], models: Any) -> None:
+    runs, table = prepared(script, models)
+    kind, settings = runs.settings_of("mpc price 0.5")
+    assert kind == "mpc" and settings.comfort_price == 0.5 and settings.guarantee is None
+    assert runs.settings_of("mpc edge -0.05")[1].back_off == -0.05 and runs.settings_of("mpc perfect")[1] is None
+    assert table.title_of("mpc price 0.5") == "MPC, a kelvin hour below counts 0.5 EUR"
+
+
 def test_a_clock_is_early_and_a_schedule_holds_its_hours(models: Callable[[str], ModuleType]) -> None:
     office = [8 <= hour < 18 for hour in range(24)]
     setpoints = models("thermostats").clock(office)
@@ -156,14 +175,19 @@ def test_every_setpoint_reaches_its_heater(made: Callable[..., Any], name: str) 
     assert (acted[heats].iloc[5] > with_own[heats].iloc[5] + 500.0).all()
 
 
+def prepared(script: Callable[[str], ModuleType], models: Callable[[str], ModuleType]) -> tuple[ModuleType, ModuleType]:
+    """Runs and table, after what they import."""
+    for name in ("plants", "periods"):
+        models(name)
+    for name in ("_code", "_table", "_foreign_rules", "_common_control", "_do_mpc_peer", "_foreign_do_mpc"):
+        script(name)
+    return script("_foreign_runs"), script("foreign_plants")
+
+
 @needs_energyplus
 def test_a_run_of_the_table(script: Callable[[str], ModuleType], models: Any, tmp_path: Path,
                             monkeypatch: pytest.MonkeyPatch) -> None:  # fmt: skip
-    for name in ("plants", "periods"):
-        models(name)
-    for name in ("_code", "_table", "_foreign_rules", "_common_control", "_do_mpc_peer", "_foreign_do_mpc", "_foreign_runs"):
-        script(name)
-    table, runs = script("foreign_plants"), script("_foreign_runs")
+    runs, table = prepared(script, models)
     monkeypatch.setattr(runs, "DAYS", 1)
     arguments = ["--out", str(tmp_path), "--plants", "house", "--periods", "coldest", "--controllers", "own", "rule"]
     assert table.main(arguments) == 0

@@ -1,0 +1,107 @@
+"""Twelve small buildings whose components are drawn at random: four of each thing that heats."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from energyplus_trials.frame import Objects
+
+from foreign_models.flats import Flat, flats
+from foreign_models.flats import description as of_flats
+from foreign_models.heat_pump import HeatPump
+from foreign_models.house import House, house
+from foreign_models.house import description as of_house
+from foreign_models.objects import Fabric
+from foreign_models.shop import Shop, shop
+from foreign_models.shop import description as of_shop
+
+#: Stream of random numbers, and buildings of each kind.
+SEED, EACH = 2025, 4
+
+#: Places with winters, of those that EnergyPlus brings.
+PLACES = (
+    "USA_VA_Sterling-Washington.Dulles.Intl.AP.724030_TMY3", "USA_IL_Chicago-OHare.Intl.AP.725300_TMY3",
+    "USA_CO_Golden-NREL.724666_TMY3", "USA_NJ_Newark.Intl.AP.725020_TMY3",
+)  # fmt: skip
+
+
+class Drawn(NamedTuple):
+    """A building that was drawn: what `ForeignPlant` is made of."""
+
+    about: str
+    model: Callable[[], Objects]
+    description: Callable[[], dict[str, Any]]
+    weather: str
+
+
+def drawn_plants() -> dict[str, Drawn]:
+    """Draw the buildings by name; the same whatever is done with them."""
+    found = {}
+    for number in range(3 * EACH):
+        rng = np.random.default_rng([SEED, number])
+        draw = (_house, _flats, _shop)[number % 3]
+        about, model, description = draw(rng)
+        found[f"drawn_{number + 1}"] = Drawn(about, model, description, str(rng.choice(PLACES)))
+    return found
+
+
+_Parts = tuple[str, Callable[[], Objects], Callable[[], dict[str, Any]]]
+
+
+def _fabric(rng: np.random.Generator) -> Fabric:
+    """Draw a fabric: of the seventies to that of today."""
+    wall = float(rng.uniform(0.04, 0.16))
+    glass = (float(rng.uniform(1.1, 2.6)), float(rng.uniform(0.35, 0.65)))
+    leaks, heavy = float(rng.uniform(0.2, 0.7)), bool(rng.random() < 0.5)
+    return Fabric(wall, 1.5 * wall, wall, glass, leaks, heavy, float(rng.uniform(1.0, 4.0)))
+
+
+def _loss(fabric: Fabric, area: float, envelope: float, glass: float, height: float) -> float:
+    """Heat that a building loses at 35 K, walls, glass and air [W]."""
+    walls = 0.035 / fabric.wall * envelope + fabric.glass[0] * glass
+    return 35.0 * (walls + 0.33 * fabric.air_changes * area * height)
+
+
+def _house(rng: np.random.Generator) -> _Parts:
+    """Draw a house with a heated floor."""
+    fabric, length, width = _fabric(rng), float(rng.uniform(9.0, 16.0)), float(rng.uniform(8.0, 13.0))
+    south = float(rng.uniform(0.04, 0.1)) * length * width
+    need = _loss(fabric, length * width, 2.0 * length * width + 5.4 * (length + width), 1.75 * south, 2.7)
+    machine = HeatPump(
+        round(need * float(rng.uniform(1.2, 1.8)), -2), float(rng.uniform(3.5, 4.8)), float(rng.uniform(0.1, 0.5)),
+        float(rng.uniform(0.2, 0.4)),
+    )  # fmt: skip
+    of = House(fabric, length, width, south=south, machine=machine, people=float(rng.integers(1, 6)),
+               appliances=float(rng.uniform(100.0, 500.0)))  # fmt: skip
+    about = f"House of {of.area:.0f} m2, heated floor, heat pump of {machine.capacity / 1e3:.1f} kW"
+    return about, partial(house, of), partial(of_house, of)
+
+
+def _flats(rng: np.random.Generator) -> _Parts:
+    """Draw one to three flats with baseboards."""
+    fabric, listed = _fabric(rng), {}
+    need = _loss(fabric, 70.0, 40.0, 12.0, 2.6)
+    for k in range(int(rng.integers(1, 4))):
+        begin = int(rng.integers(6, 10))
+        out = (begin, begin + int(rng.integers(0, 12)))
+        power = round(need * float(rng.uniform(1.3, 2.0)), -2)
+        listed[f"FLAT_{k + 1}"] = Flat(float(rng.integers(1, 5)), power, out, float(rng.uniform(60.0, 250.0)))
+    watts = sum(flat.power for flat in listed.values())
+    about = f"{'Flat' if len(listed) == 1 else f'{len(listed)} flats'} of 70 m2, baseboards of {watts / 1e3:.1f} kW"
+    return about, partial(flats, listed, fabric), partial(of_flats, listed)
+
+
+def _shop(rng: np.random.Generator) -> _Parts:
+    """Draw a shop with a unitary heat pump."""
+    fabric, length, depth = _fabric(rng), float(rng.uniform(8.0, 20.0)), float(rng.uniform(8.0, 14.0))
+    height, opens = float(rng.uniform(2.8, 4.0)), (int(rng.integers(6, 11)), int(rng.integers(17, 22)))
+    glass = float(rng.uniform(0.2, 0.34)) * length * height
+    need = _loss(fabric, length * depth, 2.0 * length * depth + 2.0 * length * height, glass, height)
+    capacity, resistance = (round(need * float(rng.uniform(*of)), -2) for of in ((1.2, 2.0), (0.3, 0.8)))
+    of = Shop(fabric, length, depth, height, glass, float(rng.integers(2, 12)), float(rng.uniform(200.0, 900.0)),
+              capacity, resistance, opens)  # fmt: skip
+    about = f"Shop of {of.area:.0f} m2, unitary heat pump of {capacity / 1e3:.1f} kW"
+    return about, partial(shop, of), partial(of_shop, of)
