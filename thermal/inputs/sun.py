@@ -33,7 +33,9 @@ _NORMAL = "direct_normal_irradiance_sensor"
 _DIFFUSE = "diffuse_horizontal_irradiance_sensor"
 _GLOBAL = "global_horizontal_irradiance_sensor"
 
-_DAY = 86_400 * 10**9  # ns
+#: A day, and what is no longer than a forecast: its days are kept, as it comes again a step later [ns].
+_DAY = 86_400 * 10**9
+_FORECAST = 2 * _DAY
 
 
 def incidence_modifier(cosine: FloatArray) -> FloatArray:
@@ -197,9 +199,8 @@ def _place(location: Location, middle: pd.DatetimeIndex) -> tuple[FloatArray, Fl
     """Azimuth and altitude of the sun [deg]."""
     stamps = middle.as_unit("ns").asi8
     steps = np.unique(np.diff(stamps))
-    if len(steps) != 1 or steps[0] <= 0 or _DAY % steps[0]:
+    if len(steps) != 1 or steps[0] <= 0 or _DAY % steps[0] or stamps[-1] - stamps[0] > _FORECAST:
         return _positions(location, middle)
-    # whole days that are kept: a controller's next forecast is the last one, a step later
     step, first, last = int(steps[0]), int(stamps[0]), int(stamps[-1])
     days = [_of_day(location, day, first % step, step) for day in range(first // _DAY, last // _DAY + 1)]
     begin = (first - first // _DAY * _DAY) // step
