@@ -53,8 +53,10 @@ IF pump_told >= 0.0
   SET flowing = pump_told
 ENDIF
 SET valve = 120.0 * flowing - 60.0
-SET leaving = @Max supply 20.0
-SET leaving = @Min leaving 60.0
+SET leaving = @Min supply 60.0
+IF supply < 20.0
+  SET leaving = 30.0
+ENDIF
 """
 _DISPATCH = """
 SET share = @CurveValue map leaving outdoor
