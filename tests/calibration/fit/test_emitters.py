@@ -7,6 +7,7 @@ from typing import Any, cast
 
 import numpy as np
 import pandas as pd
+import pytest
 
 from calibration.fit.calibrate import calibrate
 from calibration.fit.result import CalibrationResult
@@ -74,6 +75,7 @@ def climbed(case: Case) -> CalibrationResult:
     return calibrate(case, settings={"climb": True, "starts": 1})
 
 
+@pytest.mark.long
 def test_a_heated_floor_is_found_and_where_it_is() -> None:
     case = twin("floor", "radiator")
     found = climbed(case)
