@@ -39,13 +39,18 @@ COLUMNS = ("plant", "days", "asked, %", "seen, %", "by piece, %", "distance kept
            "below the band, K h a zone", "energy, kWh/m²", "against none asked, %", "CPU, s")  # fmt: skip
 
 
-def perform(name: str, share: float, out: Path, days: int) -> dict[str, Any]:
-    """Run a plant over a season with a share that is asked for, 0 for none, or read what came of it."""
+def perform(name: str, share: float, out: Path, days: int, finished: bool) -> dict[str, Any] | None:
+    """Run a plant over a season with a share that is asked for, 0 for none, or read what came of it.
+
+    With ``finished`` no further piece is run: None where there is none.
+    """
     pieces: list[dict[str, Any]] = []
     for k in range(PIECES):
         start = f"{pd.Timestamp(START) + pd.Timedelta(days=k * EVERY):%Y-%m-%d}"
         path = out / name / f"{start}_{days}_{share:g}.json"
         if not path.exists():
+            if finished:
+                break
             kept = pieces[-1]["kept"] if pieces and share else None
             path.parent.mkdir(parents=True, exist_ok=True)
             part = path.with_suffix(".part")
@@ -53,8 +58,10 @@ def perform(name: str, share: float, out: Path, days: int) -> dict[str, Any]:
             os.replace(part, path)
         pieces.append(dict(json.loads(path.read_text(encoding="utf-8"))))
         print(f"{name} {share:g} from {start}: {100.0 * seen(pieces[-1:]):.2f} %", flush=True)
+    if not pieces:
+        return None
     return {
-        "plant": name, "days": PIECES * days, "asked": share, "seen": seen(pieces), "kept": pieces[-1]["kept"],
+        "plant": name, "days": len(pieces) * days, "asked": share, "seen": seen(pieces), "kept": pieces[-1]["kept"],
         "by_piece": [seen([each]) for each in pieces], "code": code(),
         **{key: sum(each[key] for each in pieces) for key in ("energy", "cost", "below", "cpu_seconds")},
     }  # fmt: skip
@@ -86,10 +93,11 @@ def piece(name: str, share: float, out: Path, start: str, days: int, kept: list[
 
 def table_of(runs: list[dict[str, Any]]) -> str:
     """Lay the results out."""
-    none = {row["plant"]: row["energy"] for row in runs if not row["asked"]}
+    none = {(row["plant"], row["days"]): row["energy"] for row in runs if not row["asked"]}
     rows = []
     for row in runs:
-        against = f"{100.0 * (row['energy'] / none[row['plant']] - 1.0):+.2f}" if row["plant"] in none else ""
+        base = none.get((row["plant"], row["days"]))
+        against = "" if base is None else f"{100.0 * (row['energy'] / base - 1.0):+.2f}"
         asked = f"{100.0 * row['asked']:g}" if row["asked"] else "none"
         kept = np.ravel(row["kept"]) if row["kept"] else np.zeros(1)
         pieces = ", ".join(f"{100.0 * value:.1f}" for value in row["by_piece"])
@@ -106,14 +114,15 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--plants", nargs="+", default=["shop", "house", "flats"], choices=list(PLANTS))
     parser.add_argument("--shares", nargs="+", type=float, default=[0.0, 0.05])
     parser.add_argument("--days", type=int, default=EVERY, help="of each piece")
+    parser.add_argument("--finished", action="store_true", help="lay out the pieces that are there, without new ones")
     parser.add_argument("--publish", action="store_true", help="replace the table between its marks")
     options = parser.parse_args(arguments)
-    runs = []
+    runs = list[dict[str, Any]]()
     try:
         for name in options.plants:
             for share in options.shares:
-                runs.append(perform(name, share, options.out, options.days))
-                print(f"{name} {share:g}: {100.0 * runs[-1]['seen']:.2f} % seen", flush=True)
+                row = perform(name, share, options.out, options.days, options.finished)
+                runs += [] if row is None else [row]
     except EnergyPlusError as error:
         print(error, file=sys.stderr)
         return 1
