@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from mpc.control.identified.controller import IdentifiedController, PlannedAction
+from mpc.control.identified.action import PlannedAction
+from mpc.control.identified.controller import IdentifiedController
 from mpc.control.identified.problem import SCALE
 from mpc.control.solvers.solution import Status
 from mpc.control.solvers.stages import StageData, StageProblem, StageSolution

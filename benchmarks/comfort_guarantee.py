@@ -62,7 +62,7 @@ def perform(name: str, share: float, out: Path, days: int, finished: bool) -> di
         return None
     return {
         "plant": name, "days": len(pieces) * days, "asked": share, "seen": seen(pieces), "kept": pieces[-1]["kept"],
-        "by_piece": [seen([each]) for each in pieces], "code": code(),
+        "by_piece": [seen([each]) for each in pieces], "energies": [each["energy"] for each in pieces], "code": code(),
         **{key: sum(each[key] for each in pieces) for key in ("energy", "cost", "below", "cpu_seconds")},
     }  # fmt: skip
 
@@ -93,11 +93,12 @@ def piece(name: str, share: float, out: Path, start: str, days: int, kept: list[
 
 def table_of(runs: list[dict[str, Any]]) -> str:
     """Lay the results out."""
-    none = {(row["plant"], row["days"]): row["energy"] for row in runs if not row["asked"]}
+    none = {row["plant"]: row["energies"] for row in runs if not row["asked"]}
     rows = []
     for row in runs:
-        base = none.get((row["plant"], row["days"]))
-        against = "" if base is None else f"{100.0 * (row['energy'] / base - 1.0):+.2f}"
+        pairs = list(zip(row["energies"], none.get(row["plant"], []), strict=False))  # of the pieces that both have
+        mine, base = (sum(each[k] for each in pairs) for k in (0, 1))
+        against = f"{100.0 * (mine / base - 1.0):+.2f}" if pairs else ""
         asked = f"{100.0 * row['asked']:g}" if row["asked"] else "none"
         kept = np.ravel(row["kept"]) if row["kept"] else np.zeros(1)
         pieces = ", ".join(f"{100.0 * value:.1f}" for value in row["by_piece"])

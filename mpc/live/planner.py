@@ -11,7 +11,8 @@ import pandas as pd
 
 from mpc.adapters.described.actuators import described_actuators
 from mpc.baselines.plants import FullSpeed
-from mpc.control.identified.controller import IdentifiedController, PlannedAction
+from mpc.control.identified.action import PlannedAction
+from mpc.control.identified.controller import IdentifiedController
 from mpc.errors import LiveError, MpcError
 from mpc.identify.machines import find_machines
 from mpc.identify.model import read_model

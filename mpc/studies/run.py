@@ -11,7 +11,7 @@ import pandas as pd
 from calibration.progress import Forward, Progress
 from mpc.control.controller.controller import MpcController
 from mpc.control.controller.site import Action
-from mpc.control.identified.controller import PlannedAction
+from mpc.control.identified.action import PlannedAction
 from mpc.control.predictor.predictor import Predictor
 from mpc.errors import ControlError
 from mpc.identify.telemetry import on_control_steps, run_recorded

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import partial
 from typing import Literal, get_args
 
 import numpy as np
-import pandas as pd
 
 from calibration.estimation.state_space import REFERENCE
+from mpc.control.identified.action import PlannedAction
 from mpc.control.identified.ahead import Ahead
 from mpc.control.identified.beyond import PowerLearner, bought
 from mpc.control.identified.by_rule import RuleEstimate, estimate_rule
@@ -95,44 +95,6 @@ class _Runs:
     left: float
     on: bool = False
     since: int = 1_000_000
-
-
-class PlannedAction(dict[str, float]):
-    """Values by ``ENTITY/POINT``, and what was expected of them.
-
-    Parameters
-    ----------
-    values : mapping of str to float
-        [unit of each actuator].
-    stamp : Timestamp
-        When the action begins.
-    source, reasons : str and tuple of str
-        ``optimal plan`` or ``rules``, and why.
-
-    Attributes
-    ----------
-    solution : StageSolution or None
-        Of the solver.
-    zone, power : ndarray
-        Expected at the edges of the steps, shape (N + 1, n_zone) [K], and electricity and other carriers over them,
-        shape (N, 2) [W].
-    compare : callable or None
-        Makes `rule`; None where electricity is decided too.
-    """
-
-    def __init__(self, values: Mapping[str, float], stamp: pd.Timestamp, source: str, reasons: tuple[str, ...]) -> None:
-        super().__init__(values)
-        self.stamp, self.source, self.reasons = stamp, source, reasons
-        self.step, self.seconds = 900.0, 0.0
-        self.solution: StageSolution | None = None
-        self.zone: FloatArray = np.empty((0, 0))
-        self.power: FloatArray = np.empty((0, 2))
-        self.compare: Callable[[], RuleEstimate] | None = None
-
-    @cached_property
-    def rule(self) -> RuleEstimate | None:
-        """What the plan and the rule cost over the horizon, made when it is asked for."""
-        return None if self.compare is None else self.compare()
 
 
 class IdentifiedController:
