@@ -36,7 +36,7 @@ class RunLimits:
     hold : int
         Shortest run and shortest rest, in steps.
     left, back : float
-        Starts that it has left, and those that come back with each step.
+        Starts that it has left, and those that come back with each step [-].
     price : float
         Of a start [as the problem's cost].
     """
