@@ -195,13 +195,19 @@ def seek(
     if about_drawing != "no_gap":
         # a drawing that is known to lack what nothing explains has no advance
         advance = 0.0 if about_drawing == "unexplained" else ADVANCE
-        structures = Structures(*other_structures(models, rounds[-1].after, whole.part(0.5), advance))
-        if structures.kept is not None and drawing_fails(structures.rungs, structures.kept):  # names make up for it
-            free = search_free(models, structures.kept, known, ruled_out, whole.part(0.6, "free structure"))
-            models, rounds, untestable, left_over = free.models, free.rounds, free.untestable, free.left_over
-            structures = structures._replace(kept=free.kept)
-        elif about_drawing == "unexplained" and rounds[0].accepted and not is_large(case.building.zone_names):
-            left_over = regular(models, rounds[-1].after)
+        compared = [rounds[-1].after]
+        if case.building.geometry_quality == "generic" and rounds[0].accepted is not None:
+            compared.insert(0, rounds[0].before)  # a drawing that is a guess has nothing to defend by what was found
+        for fit in compared:
+            structures = Structures(*other_structures(models, fit, whole.part(0.5), advance))
+            if structures.kept is not None and drawing_fails(structures.rungs, structures.kept):  # names make up for it
+                free = search_free(models, structures.kept, known, ruled_out, whole.part(0.6, "free structure"))
+                models, rounds, untestable, left_over = free.models, free.rounds, free.untestable, free.left_over
+                structures = structures._replace(kept=free.kept)
+                break
+        else:
+            if about_drawing == "unexplained" and rounds[0].accepted and not is_large(case.building.zone_names):
+                left_over = regular(models, rounds[-1].after)
     steps, floor = how_far(models, rounds)
     verdict = doubted(judge(rounds, untestable, left_over), {s.effects[-1] for s in steps if s.void})
     if free is not None and structures is not None:
