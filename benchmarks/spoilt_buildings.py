@@ -1,9 +1,8 @@
 """Blind trials of the diagnosis on measured buildings: as they are, and with a known fault put into their telemetry.
 
 Nobody knows all that a measured building holds, so each is its own twin: effects that the diagnosis of the case as it
-is accepts are the building's, and of the others what is put in must come first. Of a building as it is only what is
-documented of it may be named. A spoil counts where it raises the held-out error of the calibrated baseline by 0.05 K
-over that of the twin. Telemetry is spoilt in these ways:
+is accepts are the building's, and of the others what is put in must come first. A spoil counts where it raises the
+held-out error of the calibrated baseline by 0.05 K over that of the twin. Telemetry is spoilt in these ways:
 
 - ``sensor_bias``, ``sensor_lag``: one zone's sensor reads too much or too little, or follows slowly;
 - ``clock_shift``: the weather station's clock is off, by an hour or by as many steps as can be seen;
@@ -47,9 +46,6 @@ from thermal.errors import ThermalError
 NAME = "spoilt_buildings"
 
 TEMPERATURE, POWER = "zone_air_temperature_sensor", "heating_power_sensor"
-
-#: What is known of the buildings as they are, by the sun's position (docs/validation.md): a name that is right there.
-DOCUMENTED = {"measured_lboro": frozenset({"clock_shift"})}
 
 #: Spoilt building and telemetry, where, and how much.
 Spoilt = tuple[Building, pd.DataFrame, tuple[str, ...], dict[str, Any]]
@@ -211,8 +207,7 @@ def read(out: Path) -> dict[str, tuple[dict[str, Any], Trial]]:
         _, right, unexplained = SPOILS.get(label["kind"], (None, (), False))
         as_is = answers.get(label["twin"])
         twin = float("nan") if as_is is None else gap_of(as_is)
-        accepted = {c for step in (as_is or answer)["how_far"] for c in step["effects"]}
-        own = DOCUMENTED.get(label["source"], frozenset()) if null else accepted
+        own = {c for step in (as_is or answer)["how_far"] for c in step["effects"]} if not null else set()
         answer = {**answer, "which": [c for c in answer["which"] if c["effect"] not in own]}
         if (
             own
