@@ -14,8 +14,8 @@ again. What is counted comes from the device and the wire, not from the guard:
 - lines of the guard's and the controller's logs that do not replay, and samples that were acknowledged, committed or
   spooled, and are not in the database at the end.
 
-Drills come in pieces of 50, each a seed and a site of its own; sites run at the same time as drills mostly wait: one
-takes about 3.5 s and one second of CPU. A run that is interrupted goes on with the pieces that are not there.
+Drills come in pieces of at most 50, each a seed and a site of its own; sites run side by side as drills mostly
+wait: one takes about 3.5 s and one second of CPU. A run that is interrupted goes on with what is not there.
 
 Run: ``python benchmarks/live_drills.py --drills 1000 --sites 3 --out results/drills --publish``.
 Writes ``live_drills.json`` and ``.md``. Needs the extra ``[live]``, PostgreSQL, and ``pip install rusty-bacnet``.
@@ -53,7 +53,7 @@ from mpc.live.site import Site
 #: Control steps within which a healed site must act again, a part that starts among them; else it counts as not back.
 BACK = 60.0
 
-#: Drills of a piece.
+#: Drills of a piece, at most.
 PIECE = 50
 
 #: Differences that clocks of two processes and single precision explain: of a rate's time [s], and of a value [K].
@@ -253,7 +253,8 @@ def run_pieces(count: int, seed: int, out: Path, only: str = "", sites: int = 1,
     """Run what is not there yet of so many drills, and put all together."""
     folder = out / "pieces"
     folder.mkdir(parents=True, exist_ok=True)
-    sizes = [min(PIECE, count - begin) for begin in range(0, count, PIECE)]
+    most = min(PIECE, -(-count // sites))
+    sizes = [min(most, count - begin) for begin in range(0, count, most)]
     pieces = [(seed + k, size, folder / f"{seed + k}_{size}.json", only, keep) for k, size in enumerate(sizes)]
     with ProcessPoolExecutor(sites, max_tasks_per_child=1) as pool:
         list(pool.map(run_piece, [piece for piece in pieces if not piece[2].exists()]))

@@ -133,6 +133,7 @@ def test_the_null_balances_and_holds_nothing_else(trials, small):
     assert account.terms["heat"] > 300.0
 
 
+@pytest.mark.long
 @pytest.mark.energyplus
 @needs_energyplus
 @pytest.mark.parametrize(

@@ -77,6 +77,7 @@ def test_errors_are_those_of_an_evaluation(study: ModuleType, bench: Any) -> Non
     assert error == pytest.approx(predictions.error, abs=1e-9)
 
 
+@pytest.mark.long
 def test_every_method_on_a_twin(study: ModuleType, tables: ModuleType, bench: Any) -> None:
     rows = [bench.uncalibrated(), bench.searched("paper", "our structure")]
     rows.append(bench.ours("ours, on (a)", [bench.intervals.tune]))

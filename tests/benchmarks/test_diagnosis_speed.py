@@ -21,6 +21,7 @@ def speed(script: Callable[[str], ModuleType]) -> ModuleType:
     return script("diagnosis_speed")
 
 
+@pytest.mark.long
 def test_a_case_is_diagnosed_by_the_command_and_timed(speed: ModuleType, tmp_path: Path) -> None:
     office = pilot_building(3, floor_area=120.0, zones=4, floors=1, name="office")
     twin = generate_twin(office, 3, TwinSettings(days=9.0, step_seconds=1800.0, dx=1.0, meter="exact"))[0]
@@ -36,6 +37,7 @@ def test_a_case_is_diagnosed_by_the_command_and_timed(speed: ModuleType, tmp_pat
     assert (tmp_path / "out" / "report.html").is_file()
 
 
+@pytest.mark.long
 def test_a_case_that_cannot_be_diagnosed_ends_the_benchmark(speed: ModuleType, tmp_path: Path) -> None:
     with pytest.raises(SystemExit, match="expected a diagnosis"):
         speed.measure(tmp_path / "nothing", tmp_path / "out")

@@ -140,6 +140,7 @@ def test_heat_of_the_house_arrives_late_and_is_paid_by_the_map(
     assert (seen["floor/pump_power_sensor"][50:72] == 0.0).all()
 
 
+@pytest.mark.long
 @needs_energyplus
 @pytest.mark.parametrize("name", ["flats", "office", "shop"])
 def test_every_setpoint_reaches_its_heater(made: Callable[..., Any], name: str) -> None:

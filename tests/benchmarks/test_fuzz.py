@@ -23,6 +23,7 @@ def fuzz(script: Callable[[str], ModuleType]) -> ModuleType:
     return script("fuzz")
 
 
+@pytest.mark.long
 def test_a_thousand_inputs_raise_nothing_but_named_errors(fuzz: ModuleType) -> None:
     outcomes = fuzz.attack(1000, first=1_000_000)
     assert sum(o.inputs for o in outcomes.values()) == 1000

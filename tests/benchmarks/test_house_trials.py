@@ -336,6 +336,7 @@ def test_heat_that_is_not_what_was_given_is_refused(trials, null, package):
         readings.check_run(house, results)
 
 
+@pytest.mark.long
 @pytest.mark.energyplus
 @needs_energyplus
 @pytest.mark.parametrize("emitter", ["radiator", "floor"])

@@ -53,6 +53,7 @@ def test_the_bypass_of_a_rated_coil(offices):
     assert offices.bypass_factor(151_891.45, 6.821876, 0.736564) == pytest.approx(0.0446, abs=1e-3)
 
 
+@pytest.mark.long
 @pytest.mark.energyplus
 @pytest.mark.skipif(
     importlib.util.find_spec("pyenergyplus") is None, reason="EnergyPlus is not installed: [energyplus]"

@@ -16,6 +16,7 @@ def loop(script: Callable[[str], ModuleType]) -> ModuleType:
     return script("mpc_closed_loop")
 
 
+@pytest.mark.long
 def test_a_smoke_run_goes_on_where_it_stopped(
     loop: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -83,6 +83,7 @@ def test_measured_boundaries_keep_their_last_value(control):
     assert boundaries(None, [1, 2]).tolist() == [[296.0, 7.0]] * 2
 
 
+@pytest.mark.long
 @pytest.mark.energyplus
 @needs_energyplus
 def test_a_morning_of_optimal_control_costs_less_than_the_buildings_own(control, offices):

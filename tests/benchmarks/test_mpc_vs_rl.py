@@ -177,6 +177,7 @@ def random_policy(case: ModuleType, folder: Path) -> None:
     ActorNetwork(weights, (np.zeros(2),), "tanh", True, about).save(folder / "sac_plant_0.npz")
 
 
+@pytest.mark.long
 def test_smoke_of_the_comparison(case: ModuleType, comparison: ModuleType, tmp_path: Path) -> None:
     random_policy(case, tmp_path)
     asked = ["--out", str(tmp_path / "out"), "--policies", str(tmp_path), "--weeks", "winter", "--smoke",
@@ -199,6 +200,7 @@ def test_smoke_of_the_comparison(case: ModuleType, comparison: ModuleType, tmp_p
     assert all((tmp_path / "out" / f"mpc_vs_rl_{what}_office.svg").exists() for what in ("front", "learning"))
 
 
+@pytest.mark.long
 def test_smoke_of_the_training(tmp_path: Path) -> None:
     """As a command: torch shares no process with the solvers of other tests."""
     pytest.importorskip("stable_baselines3", reason="the extra [rl] is not installed")
@@ -215,6 +217,7 @@ def test_smoke_of_the_training(tmp_path: Path) -> None:
         assert network.about["steps"] == 96 and path.stat().st_size < 100_000
 
 
+@pytest.mark.long
 def test_training_goes_on_where_it_was_interrupted(case: ModuleType, training: ModuleType, tmp_path: Path) -> None:
     site = case.OfficeSite(case.SMOKE)
     weeks, validation = ({"week": next(iter(of.values()))} for of in (site.training_weeks, site.validation_weeks))

@@ -34,6 +34,7 @@ def in_process(command: Sequence[str], folder: Path) -> str:
     return answer.stdout
 
 
+@pytest.mark.long
 def test_from_drawings_to_a_calibrated_simulator(
     benchmark: ModuleType, blank_pictures: None, tmp_path: Path
 ) -> None:

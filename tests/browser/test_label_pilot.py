@@ -75,6 +75,7 @@ def server(tmp_path: Path) -> Iterator[tuple[str, subprocess.Popen[str]]]:
             process.kill()
 
 
+@pytest.mark.long
 def test_a_browser_labels_a_building(truth: dict[str, Any], server: tuple[str, Any], tmp_path: Path) -> None:
     pictures = Path(os.environ["BUILDINGMPC_PICTURES"]) if "BUILDINGMPC_PICTURES" in os.environ else None
     command = [

@@ -33,6 +33,7 @@ SENTENCES = [
 ]  # fmt: skip
 
 
+@pytest.mark.long
 def test_a_browser_gives_telemetry_and_makes_reports(tmp_path: Path) -> None:
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     command = [sys.executable, str(HERE / "serve_stand_in.py"), str(tmp_path)]

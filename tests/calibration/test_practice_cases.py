@@ -23,6 +23,7 @@ def calibrated(name: str) -> CalibrationResult:
 LIMITS = {"practice_none_schedule": 0.10, "practice_none_prbs": 0.16, "twinhouse_N2_exp1": 0.8}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", LIMITS)
 def test_held_out_error_after_calibration(name: str) -> None:
     """Mean absolute error six hours ahead, on the last third of the telemetry."""

@@ -66,6 +66,7 @@ def test_a_calibration_counts_starts_and_iterations_forward(case: Case) -> None:
     assert told[-1][2] == WHOLE and shares(told)[-1] > 0.95
 
 
+@pytest.mark.long
 def test_a_diagnosis_moves_forward(case: Case) -> None:
     told: Told = []
     others = [effect for effect in CATALOGUE if effect != "solar_gain"]  # one effect is quicker to look for

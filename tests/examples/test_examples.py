@@ -50,12 +50,14 @@ def test_linear_response(tmp_path: Path) -> None:
     assert (tmp_path / "linear.png").stat().st_size > 10_000
 
 
+@pytest.mark.long
 def test_calibrate_a_case() -> None:
     result = load("calibrate_a_case").run(dx=1.0)
     assert result.solver.success
     assert result.calibrated["held_out"].metrics.mae < 0.7 * result.uncalibrated["held_out"].metrics.mae
 
 
+@pytest.mark.long
 def test_case_to_controller() -> None:
     """Three hours of a mild March morning take little, and no zone leaves its band."""
     kpis = load("case_to_controller").run()

@@ -46,6 +46,7 @@ def kept(registry: dict[str, Any]) -> Iterator[None]:
     registry.update(before)
 
 
+@pytest.mark.long
 def test_a_controller_of_ones_own(tmp_path: Path) -> None:
     from mpc.studies.registry import REGISTERED
 
@@ -67,6 +68,7 @@ def test_an_indicator_of_ones_own(tmp_path: Path) -> None:
     assert "highest temperature of any zone" in (out / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.long
 def test_an_effect_of_ones_own(tmp_path: Path) -> None:
     from thermal.effects.catalogue import CATALOGUE
 

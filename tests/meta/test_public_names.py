@@ -10,6 +10,8 @@ from dataclasses import is_dataclass
 from functools import cached_property
 from typing import Any
 
+import pytest
+
 Check = Callable[[list[str]], None]
 
 # A bracket with a unit in it, such as [K], [W/m2/K], [-]; not an interval such as [0, 1], not the index of a type.
@@ -136,6 +138,7 @@ def test_an_unknown_keyword_is_refused(project: Any, expect_none: Check) -> None
     expect_none(problems)
 
 
+@pytest.mark.long
 def test_examples_in_docstrings_run(project: Any, expect_none: Check) -> None:
     problems = []
     for name, module in project.modules.items():

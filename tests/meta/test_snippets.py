@@ -36,6 +36,7 @@ def runner() -> Any:
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_blocks_run_as_printed(page: Path, runner: Any) -> None:
     """Those that are quick; the slow ones are run by hand, with benchmarks/documented_snippets.py: they take too long for every run."""

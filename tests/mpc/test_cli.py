@@ -256,6 +256,7 @@ def test_simulate(coarse_case: Path, calibrated: Path, tmp_path: Path) -> None:
     assert set(content["by_zone"]) == {"F1_N", "F1_W", "F1_C", "F1_E", "F1_S"}
 
 
+@pytest.mark.long
 def test_a_folder_of_cases_reports_each(coarse_case: Path, blank_pictures: None, spoilt: Path, tmp_path: Path) -> None:
     shutil.copytree(coarse_case, spoilt.parent / "whole")
     out = tmp_path / "out"

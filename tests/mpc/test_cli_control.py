@@ -32,6 +32,7 @@ def test_control_writes_and_prints_the_same(tmp_path: Path) -> None:
     assert again.exit_code == 2 and "--force" in again.stderr
 
 
+@pytest.mark.long
 def test_compare_prints_a_table_and_what_was_assumed(tmp_path: Path) -> None:
     answer = run("compare", CASE, *SPAN, "--controllers", "schedule,mpc", "--out", tmp_path / "two")
     assert answer.exit_code == 0, answer.stderr

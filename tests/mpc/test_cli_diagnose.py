@@ -56,6 +56,7 @@ def test_bad_input_is_named(arguments: tuple[str, ...], error: str) -> None:
     assert not Path("unused").exists()
 
 
+@pytest.mark.long
 def test_calibrate_takes_effects(coarse_case: Path, tmp_path: Path) -> None:
     out = tmp_path / "sun"
     answer = run("calibrate", coarse_case, "--out", out, "--dx", "2.0", "--starts", "1", "--effects", "solar_gain")
@@ -76,6 +77,7 @@ def test_effects_lists_the_catalogue_and_what_a_case_can_tell() -> None:
     assert "sun through the windows" in shown and "no zone lies above another" in shown
 
 
+@pytest.mark.long
 def test_what_is_known_or_ruled_out_is_not_sought(coarse_case: Path, tmp_path: Path) -> None:
     out = tmp_path / "gap"
     answer = run("diagnose", coarse_case, "--out", out, "--dx", "2.0", "--effects", "solar_gain", "--rule-out",
@@ -110,6 +112,7 @@ def test_effects_that_cannot_be_known_are_named(arguments: tuple[str, ...], mess
     assert not (tmp_path / "gap").exists()
 
 
+@pytest.mark.long
 def test_a_folder_of_cases_is_diagnosed_case_by_case(coarse_case: Path, tmp_path: Path) -> None:
     cases = tmp_path / "cases"
     for name in ("one", "two"):

@@ -97,6 +97,7 @@ def test_bad_input_is_refused_by_name(tmp_path: Path, drawings: Path) -> None:
     assert run("--port", "70000").exit_code == 2
 
 
+@pytest.mark.long
 def test_it_serves_the_page_until_it_is_interrupted(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "mpc.cli", "label", str(tmp_path / "case"), "--no-browser"]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
@@ -121,6 +122,7 @@ def test_it_serves_the_page_until_it_is_interrupted(tmp_path: Path) -> None:
     assert not (tmp_path / "case" / "labelling" / "open.json").exists()
 
 
+@pytest.mark.long
 def test_a_report_is_made_in_a_process_of_its_own(drawings: Path, served: list[Any], tmp_path: Path) -> None:
     run(drawings)
     case, told = drawings.with_suffix(""), []

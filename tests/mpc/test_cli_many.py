@@ -93,6 +93,7 @@ def start(cases: Path, out: Path, workers: str) -> subprocess.Popen[str]:
     )  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.skipif(os.name != "posix", reason="sends signals")
 def test_a_run_that_is_killed_or_interrupted_goes_on(cases: Path, tmp_path: Path, on_threads: list[Any]) -> None:
     """Killed: no worker outlives it. Interrupted: what is finished stays. Repeated: the rest is done."""
@@ -194,6 +195,7 @@ def test_the_missing_extra_is_named(cases: Path, tmp_path: Path, monkeypatch: py
     assert "MissingExtraError: " in answer.stderr and 'pip install "buildingmpc[cluster]"' in answer.stderr
 
 
+@pytest.mark.long
 def test_workers_load_the_plugins(cases: Path, tmp_path: Path) -> None:
     """An effect that only a plugin has is known in the processes of the workers."""
     text = Path(__file__).parents[2].joinpath("docs", "own_effect.md").read_text(encoding="utf-8")

@@ -80,6 +80,7 @@ def test_logs_are_replayed_in_order(tmp_path: Path) -> None:
     assert run("replay", tmp_path / "none.jsonl")[0] == 2
 
 
+@pytest.mark.long
 def test_a_guard_of_the_command_gives_back_and_listens(
     tmp_path: Path, script: Callable[[str], ModuleType]
 ) -> None:

@@ -22,6 +22,7 @@ def run(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, encoding="utf-8", timeout=120, check=False)
 
 
+@pytest.mark.long
 def test_stdout_is_json_alone() -> None:
     answer = run("check", bundled_case_path(), "--json")
     assert (answer.returncode, answer.stderr) == (0, "")

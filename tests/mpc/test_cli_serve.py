@@ -44,6 +44,7 @@ def running(*arguments: str) -> Iterator[tuple[dict[str, Any], subprocess.Popen[
         process.communicate()
 
 
+@pytest.mark.long
 @pytest.mark.skipif(os.name == "nt", reason="sends SIGINT")
 def test_the_bundled_case_is_served_until_it_is_interrupted() -> None:
     with running(str(bundled_case_path()), "--dx", "1.0") as (said, process):

@@ -95,6 +95,7 @@ def test_nothing_is_certified_where_nothing_is_missing() -> None:
     assert found is None or found.before.mae - found.after.mae < 0.01
 
 
+@pytest.mark.long
 def test_a_diagnosis_without_the_right_effect_hands_it_on(tmp_path: Path) -> None:
     every = [e for e in CATALOGUE if e != "solar_gain"]
     found = diagnose(draughty(), dx=1.0, ruled_out=every)

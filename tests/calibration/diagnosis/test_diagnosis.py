@@ -59,6 +59,7 @@ def diagnosed(zone: str | None) -> Diagnosis:
     return diagnose(twin() if zone is None else changed(zone), dx=1.0)
 
 
+@pytest.mark.long
 def test_nothing_is_found_where_nothing_is_missing() -> None:
     found = diagnosed(None)
     assert found.verdict.name == "no_gap"
@@ -77,7 +78,7 @@ def test_the_answer_is_that_of_the_whole_diagnosis() -> None:
     assert {"verdict", "which", "rounds"} <= answer.keys()
 
 
-@pytest.mark.parametrize("number", [1, 3])
+@pytest.mark.parametrize("number", [1, pytest.param(3, marks=pytest.mark.long)])
 def test_a_meter_that_reads_too_low_is_named_with_its_zone_and_its_error(number: int) -> None:
     zone = twin().building.zone_names[number]
     found = diagnosed(zone)

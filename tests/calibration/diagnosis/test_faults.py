@@ -47,6 +47,7 @@ def swapped() -> tuple[Case, tuple[str, str]]:
     return changed(frame), zones
 
 
+@pytest.mark.long
 def test_a_clock_that_is_late_is_put_right_and_the_error_falls() -> None:
     (fault,) = mend(late(), (), (), SETTINGS)
     assert (fault.effect, fault.hours, fault.zones) == ("clock_shift", -2.0, ())

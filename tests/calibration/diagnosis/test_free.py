@@ -55,6 +55,7 @@ def diagnosed() -> Diagnosis:
     return diagnose(Case(drawn_wrongly(twin().building), twin().telemetry))
 
 
+@pytest.mark.long
 def test_a_wrong_drawing_is_said_to_be_wrong_and_the_search_goes_on_without_it() -> None:
     found = diagnosed()
     drawn, *others = found.rungs

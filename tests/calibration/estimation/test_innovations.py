@@ -101,6 +101,7 @@ def test_result_is_the_likeliest_and_says_so() -> None:
             assert lower < found.log_likelihood
 
 
+@pytest.mark.long
 def test_a_start_near_the_optimum_finds_the_same_sooner() -> None:
     inputs, wanted = telemetry(0), tuned(0)
     for per_zone in ((), ("deviation", "sensor_deviation")):
@@ -125,6 +126,7 @@ def holed(seed: int, days: float) -> Inputs:
     return replace(sensed(inputs, zone), complete=known)
 
 
+@pytest.mark.long
 def test_gaps_and_several_intervals() -> None:
     inputs = holed(1, 3.0)
     s = inputs.stamps
@@ -164,6 +166,7 @@ def test_random_walk_is_found_again_and_left_out_where_nothing_is_measured() -> 
     np.testing.assert_allclose(np.log(deviation[[0, 1, 3, 4]] / 200.0), 0.0, atol=4.0 * found.spread["deviation"] + 0.1)
 
 
+@pytest.mark.long
 def test_deviation_of_each_zone() -> None:
     truth = DisturbanceModel(np.array([20.0, 120.0, 50.0, 200.0, 80.0]), 5400.0, 0.06)
     inputs = telemetry(4, truth, 2.0)

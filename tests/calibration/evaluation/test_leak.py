@@ -103,6 +103,7 @@ def test_predictions_know_nothing_of_the_days_after_their_start(name: str) -> No
     assert np.array_equal(before[:3], predict(altered(people=True))[:3])
 
 
+@pytest.mark.long
 def test_a_calibration_knows_nothing_of_held_out_days(tmp_path: Path) -> None:
     """Parameters stay bit for bit, and the constants are written with them, and read back."""
     tuning, held_out = intervals()

@@ -101,6 +101,7 @@ def test_a_model_that_is_beaten_is_not_yet_useful() -> None:
     assert "beats them all" in beside_sentence(0.3, yardsticks)
 
 
+@pytest.mark.long
 def test_simple_models_see_what_the_calibration_was_tuned_on(case: Case, tmp_path: Path) -> None:
     (tuned,), (judged,) = default_intervals(case)
     short = Interval(tuned.start, tuned.start + pd.Timedelta(days=4))

@@ -135,6 +135,7 @@ def test_standard_errors_cover_the_truth_over_seeds() -> None:
     assert np.mean(inside) >= 0.9
 
 
+@pytest.mark.long
 def test_errors_shrink_with_more_days() -> None:
     true = truth(cabin(), 1)
     short, long = (calibrate(telemetry(cabin(), true, 1, days)) for days in (6, 24))
@@ -221,6 +222,7 @@ def test_parameters_that_are_known_are_not_moved_much_by_noise() -> None:
         assert p.standard_error < 0.2 * p.value
 
 
+@pytest.mark.long
 def test_equal_seeds_give_equal_results_and_more_starts_no_worse_ones() -> None:
     first, again = (calibrate(plain_case(), starts=2, seed=3) for _ in range(2))
     np.testing.assert_array_equal(first.theta, again.theta)
@@ -230,6 +232,7 @@ def test_equal_seeds_give_equal_results_and_more_starts_no_worse_ones() -> None:
     assert first.calibrated["held_out"].metrics.mae < 1.1 * plain().calibrated["held_out"].metrics.mae
 
 
+@pytest.mark.long
 def test_zone_scopes_are_estimated_zone_by_zone() -> None:
     case = telemetry(cabin(2), truth(cabin(2), 3), 3)
     found = calibrate(case, scopes={"furniture_heat_capacity": "zone"})

@@ -47,7 +47,7 @@ def error(result: CalibrationResult) -> float:
     return result.calibrated["held_out"].metrics.mae
 
 
-@pytest.mark.parametrize(("kind", "name"), [("damper", "damper_airflow"), ("valve", "valve_heat")])
+@pytest.mark.parametrize(("kind", "name"), [("damper", "damper_airflow"), pytest.param("valve", "valve_heat", marks=pytest.mark.long)])
 def test_sizes_are_found_and_errors_are_those_with_meters(
     metered: Case, with_meters: float, kind: str, name: str
 ) -> None:

@@ -7,6 +7,7 @@ from typing import Any, cast
 
 import numpy as np
 import pandas as pd
+import pytest
 
 from calibration.diagnosis.baseline import fit_baseline
 from calibration.diagnosis.refit.comparison import ModelComparison
@@ -77,6 +78,7 @@ def climbed(case: Case) -> CalibrationResult:
     return calibrate(case, settings={"climb": True, "starts": 1})
 
 
+@pytest.mark.long
 def test_a_heated_floor_is_found_and_where_it_is() -> None:
     case = twin("floor", "radiator")
     found = climbed(case)

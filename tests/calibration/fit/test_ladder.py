@@ -55,6 +55,7 @@ def test_what_predicts_left_out_days_better_is_kept(climbed: CalibrationResult) 
     assert [rung["name"] for rung in plain["rungs"]] == [rung.name for rung in climbed.rungs]
 
 
+@pytest.mark.long
 def test_heat_that_is_stamped_too_early_is_moved(case: Case) -> None:
     frame = case.telemetry.frame.copy()
     heat = [c for c in frame if c.endswith(("/supply_air_flowrate_sensor", "/discharge_air_temperature_sensor"))]
@@ -71,6 +72,7 @@ def test_heat_that_is_stamped_too_early_is_moved(case: Case) -> None:
     assert "with heat and weather moved in time" in calibration_verdict(result)
 
 
+@pytest.mark.long
 def test_films_that_follow_the_wind_are_kept_without_an_advance(
     case: Case, hourly: Case, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -94,6 +96,7 @@ def test_before_is_what_the_drawing_says(case: Case, climbed: CalibrationResult)
     assert climbed.calibrated["held_out"].metrics.mae < drawn.calibrated["held_out"].metrics.mae
 
 
+@pytest.mark.long
 def test_held_out_days_have_no_say(case: Case, climbed: CalibrationResult) -> None:
     _, (held_out,) = default_intervals(case)
     frame = case.telemetry.frame.copy()
@@ -132,6 +135,7 @@ def test_left_out_days_make_bands(climbed: CalibrationResult) -> None:
     assert "carried on" in calibration_verdict(climbed)
 
 
+@pytest.mark.long
 def test_a_gain_that_recurs_is_kept_where_it_predicts_better(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ladder, "_WEEK", 3.0)
     # it predicts days left out worse here, with five of them to learn from: it is kept where it may be twice as wrong

@@ -270,6 +270,7 @@ def test_what_cannot_be_compared_is_refused(monkeypatch: pytest.MonkeyPatch) -> 
         select_structure(case, {"a": BARE, "b": {"horizon": "360min"}}, settings={"dx": 1.5})
 
 
+@pytest.mark.long
 def test_a_real_case_with_and_without_interior_mass() -> None:
     case = load_bundled_case()
     tune, hold_out = ([Interval(case.stamps[288 * a], case.stamps[288 * b])] for a, b in ((0, 2), (3, 4)))

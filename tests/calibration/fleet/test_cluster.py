@@ -68,6 +68,7 @@ def start_worker(scheduler: str, tmp_path: Path) -> Iterator[Callable[..., None]
         process.wait()
 
 
+@pytest.mark.long
 def test_a_killed_worker_of_a_cluster_loses_nothing(
     cases: Path,
     tmp_path: Path,

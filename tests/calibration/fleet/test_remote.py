@@ -69,6 +69,7 @@ def parts(folder: Any) -> dict[str, bytes]:
     return {n: folder.read(n) for n in folder.files("tables") if "/runs/" not in n}
 
 
+@pytest.mark.long
 def test_cases_on_s3(bucket: str, offices: Path, tmp_path: Path) -> None:
     """Done once, taken over afterwards, redone where a case changed; the tables are those of local files."""
     told: list[tuple[int, int]] = []
@@ -186,6 +187,7 @@ def same(path: Path) -> Path:
     return path
 
 
+@pytest.mark.long
 @pytest.mark.skipif(os.name != "posix", reason="sends signals")
 def test_poisoned_cases_are_set_aside_by_name(tmp_path: Path) -> None:
     """One that kills its worker, and one that never ends: each takes the workers it may, and none in a later run."""

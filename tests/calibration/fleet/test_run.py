@@ -43,6 +43,7 @@ def finished(cases: Path, kill_at_first: Any) -> Finished:
     return out, outcomes, kill.killed
 
 
+@pytest.mark.long
 def test_a_killed_process_loses_nothing(finished: Finished, check_nothing_is_lost: Any) -> None:
     check_nothing_is_lost(*finished)
     with pytest.raises(ProcessLookupError):
@@ -116,6 +117,7 @@ def test_results_of_another_version_are_refused(one: tuple[Path, Path], monkeypa
         calibrate_many([one[0]], one[1], SETTINGS, workers=Idle())
 
 
+@pytest.mark.long
 def test_force_calibrates_anew_and_keeps_what_it_did_not_make(one: tuple[Path, Path]) -> None:
     case, out = one
     (out / "office 0" / "notes.txt").write_text("mine", encoding="utf-8")
@@ -131,6 +133,7 @@ def test_force_calibrates_anew_and_keeps_what_it_did_not_make(one: tuple[Path, P
     assert again[0].resumed
 
 
+@pytest.mark.long
 def test_a_case_that_ends_its_workers_is_given_up_alone(cases: Path, tmp_path: Path, kill_always: Any) -> None:
     with kill_always(tmp_path, "office 0"):
         lost, other = calibrate_many([cases / "office 0", cases / "office 1"], tmp_path, SETTINGS, workers=2, retries=1)
@@ -212,6 +215,7 @@ def test_settings_are_checked_before_anything_is_done(cases: Path, tmp_path: Pat
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.long
 def test_diagnoses_go_on_and_say_what_they_found(cases: Path, tmp_path: Path) -> None:
     settings = {"horizon": "1h", "ruled_out": ["sensor_bias"], "hold_out": []}
     two = [cases / "office 0", cases / "office 1"]

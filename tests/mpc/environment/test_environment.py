@@ -179,6 +179,7 @@ def test_vectors_of_gymnasium(make_environment: Make) -> None:
     assert np.array_equal(seen[0], own) and rewards[0] == reward
 
 
+@pytest.mark.long
 def test_vectors_in_processes_of_their_own() -> None:
     def make() -> ControlEnvironment:
         return office_environment(**SMALL)

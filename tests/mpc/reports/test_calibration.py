@@ -218,6 +218,7 @@ def test_parameters_without_an_interval_are_drawn(result: CalibrationResult) -> 
     assert parameter_ranges(bare)
 
 
+@pytest.mark.long
 def test_the_page_is_the_same_twice(case: Case, result: CalibrationResult, written: Path, tmp_path: Path) -> None:
     again = write_calibration(result, case, tmp_path / "again")
     assert again.read_bytes() == (written / "report.html").read_bytes()

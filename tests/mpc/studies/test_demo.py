@@ -38,6 +38,7 @@ def demo(case: Case, blank_pictures: None, tmp_path_factory: pytest.TempPathFact
         return run_demo(out, case=case, dx=1.0, told=lambda step, verdict: said.append(step)), said
 
 
+@pytest.mark.long
 def test_each_step_leaves_a_page_and_the_first_page_leads_to_all(demo: tuple[Demo, list[str]]) -> None:
     found, said = demo
     assert said == STEPS and list(found.pages) == STEPS

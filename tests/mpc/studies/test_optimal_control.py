@@ -47,6 +47,7 @@ def test_horizons_of_any_length(hours, blocks) -> None:
         default_horizon(3600.0)
 
 
+@pytest.mark.long
 def test_it_saves_against_a_fixed_schedule(model, make_plant) -> None:
     plant = make_plant()
     controller = make_controller(model, plant, horizon=default_horizon(900.0, 6.0))
@@ -134,6 +135,7 @@ def test_sampled_plans_cost_what_the_predictor_says_and_are_followed(model, make
     assert solution.plan.shape == (5, 2) and len(controller.problem.predictor.horizon) == 24
 
 
+@pytest.mark.long
 def test_a_plan_tried_on_members_costs_what_the_smooth_model_says(model, make_plant) -> None:
     plant, caught = make_plant(noise=None), []
     controller = make_sampling_controller(model, plant, hours=6.0, method=CrossEntropy(samples=4, rounds=1))

@@ -104,6 +104,7 @@ def test_the_bound_knows_the_state(make: Callable[..., Study]) -> None:
     np.testing.assert_allclose(plant.record().zone_temperature[-1], planned, atol=0.15)
 
 
+@pytest.mark.long
 def test_optimal_control_costs_less_and_the_pages_say_it(both: Comparison, tmp_path: Path) -> None:
     rule, mpc = both.runs
     assert mpc.cost < rule.cost and both.best_rule is rule and both.way_to_bound(mpc) is None
@@ -122,6 +123,7 @@ def test_optimal_control_costs_less_and_the_pages_say_it(both: Comparison, tmp_p
     assert zone.to_numpy() == pytest.approx(mpc.loop.record.zone_temperature[1:] - 273.15)
 
 
+@pytest.mark.long
 def test_one_run_is_written_whole(both: Comparison, tmp_path: Path) -> None:
     page = write_control(both.runs[0], tmp_path / "one")
     assert sorted(p.name for p in page.parent.iterdir()) == ["control.json", "report.html", "trajectory.parquet"]

@@ -135,6 +135,7 @@ def test_the_command_writes_a_page(
     assert refused.value.code == 2 and "--baseline and --reporting" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_alternate_days_of_our_plant_tell_its_true_saving() -> None:
     from mpc.loop.make import PlantSettings, pilot_weather, simulated_plant
     from mpc.loop.noise import SensorNoise

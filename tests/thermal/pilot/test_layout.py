@@ -121,6 +121,7 @@ def test_pilots_of_other_seeds_keep_every_promise(seed: int) -> None:
     check(generate_office(seed), 6317.0, 123, 2)
 
 
+@pytest.mark.long
 @settings(max_examples=40, deadline=None, derandomize=True)
 @given(
     seed=st.integers(0, 2**32 - 1),

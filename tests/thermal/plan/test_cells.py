@@ -36,6 +36,7 @@ def rooms_of(widths: list[int], depth: int, wall: int) -> np.ndarray:
     return np.pad(np.pad(inside, ((wall, wall), (0, 0)), constant_values=1), 1, constant_values=2)
 
 
+@pytest.mark.long
 def test_the_pilot_comes_back_from_its_codes_with_its_127_devices(tmp_path: Path) -> None:
     plans = generate_office(0)
     floors = []

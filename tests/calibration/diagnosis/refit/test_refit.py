@@ -51,6 +51,7 @@ def late_heat() -> Case:
     return Case(building, Telemetry.from_frame(frame))
 
 
+@pytest.mark.long
 def test_days_alternate_where_the_last_third_shows_what_the_others_do_not() -> None:
     case = late_heat()
     found = diagnose(case, dx=1.0)
@@ -66,6 +67,7 @@ def test_days_alternate_where_the_last_third_shows_what_the_others_do_not() -> N
     assert "tuning and held-out days alternate" in alternating_sentence(found)
 
 
+@pytest.mark.long
 def test_given_intervals_are_kept_whatever_they_show() -> None:
     case = late_heat()
     tuning, judged = default_intervals(case)

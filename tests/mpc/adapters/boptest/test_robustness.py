@@ -176,6 +176,7 @@ def test_a_taken_port_is_named(served: BoptestCase, server: BoptestServer) -> No
         BoptestServer([served], port=99_999)
 
 
+@pytest.mark.long
 def test_fifty_clients_at_once_each_have_a_plant_of_their_own(server: BoptestServer, http: httpx.Client) -> None:
     """Each with another setpoint: what it reads is what a lone client reads."""
     name, air = "AHU_F1_supply_air_temperature_setpoint", "AHU_F1_supply_air_temperature_sensor"

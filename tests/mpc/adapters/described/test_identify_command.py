@@ -49,6 +49,7 @@ def run(*arguments: str | Path) -> Any:
     return CliRunner().invoke(app, [str(a) for a in arguments])
 
 
+@pytest.mark.long
 def test_identify_then_control(tmp_path: Path, make_house: Callable[..., Path]) -> None:
     plant, model = tmp_path / "plant.yaml", tmp_path / "model"
     plant.write_text(DESCRIPTION)

@@ -49,6 +49,7 @@ def alone(office, tmp_path_factory):
     return found
 
 
+@pytest.mark.long
 def test_own_control_is_energyplus_alone(own, alone):
     assert set(own.metered()) == set(alone)
     for name, energy in own.metered().items():
@@ -133,6 +134,7 @@ def test_a_dead_process_is_a_named_error_and_nothing_is_left(make_plant, left_ov
         plant.step({})
 
 
+@pytest.mark.long
 def test_a_warm_up_that_swings_without_end_is_no_error_of_the_run(office):
     """A plenum of that day has two states that follow each other for 25 days, which EnergyPlus calls severe."""
     from mpc.adapters.energyplus.make import energyplus_plant
