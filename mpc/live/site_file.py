@@ -33,6 +33,8 @@ class BacnetLink(Entry):
         That values are written at, 1 to 16.
     timeout : float
         How long a request waits for its answer [s].
+    cov : float or None
+        Lifetime of the collector's subscriptions to changes of value [s], at least 10; None polls.
     """
 
     kind: Literal["bacnet"]
@@ -40,6 +42,7 @@ class BacnetLink(Entry):
     local: Text = "127.0.0.1/8:0"
     priority: Annotated[int, Field(ge=1, le=16, strict=True)] = PRIORITY
     timeout: Positive = 3.0
+    cov: Annotated[float, Field(ge=10.0)] | None = None
 
 
 class MqttLink(Entry):

@@ -1,4 +1,4 @@
-"""BACnet/IP by bacpypes3: many properties a request, writes and their end at a priority of one's own."""
+"""BACnet/IP by bacpypes3: many properties a request or told when they change, writes at a priority of one's own."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from mpc.errors import LiveError
+from mpc.live.links.changes import Subscriptions
 from mpc.live.links.link import reading
 from mpc.live.site_file import BacnetLink
 from mpc.loop.conversion import Conversion
@@ -30,11 +31,13 @@ class BacnetConnection:
     def __init__(self, link: BacnetLink, points: Mapping[str, tuple[str, Conversion]]) -> None:
         self.link, self.points = link, points
         self._app: Any = None
+        self._changes: Subscriptions | None = None
         self._device = extra("bacpypes3.local.device", "live", "BACnet")
         self._application = extra("bacpypes3.ipv4.app", "live", "BACnet")
         self._pdu = extra("bacpypes3.pdu", "live", "BACnet")
         self._raised = extra("bacpypes3.apdu", "live", "BACnet").ErrorRejectAbortNack
-        self._null = extra("bacpypes3.primitivedata", "live", "BACnet").Null
+        primitives = extra("bacpypes3.primitivedata", "live", "BACnet")
+        self._null, self._identifier = primitives.Null, primitives.ObjectIdentifier
 
     async def open(self) -> None:
         """Begin."""
@@ -58,7 +61,23 @@ class BacnetConnection:
         names, slots
             As of `Link`.
         """
-        wanted, most = list(names), _WITH_SLOTS if slots else _PLAIN
+        wanted = list(names)
+        if slots or self.link.cov is None:
+            return await self._polled(wanted, slots)
+        if self._changes is None:
+            objects = {name: self._identifier(self.points[name][0]) for name in wanted}
+            self._changes = Subscriptions(self._app, self._address, objects, self.link.cov, (self._raised, OSError))
+        known = {name: self._reading(name, [value]) for name, value in self._changes.values.items() if name in wanted}
+        # one that is known is asked for, too: of a device that tells nothing it is not clear whether it is there
+        found = await self._polled([name for name in wanted if name not in known] + list(known)[:1], slots)
+        if known and all(one["error"] for one in found.values()):
+            self._changes.forget()
+            return await self._polled(wanted, slots)
+        return known | found
+
+    async def _polled(self, wanted: Sequence[str], slots: bool) -> dict[str, dict[str, Any]]:
+        """Ask for points."""
+        most = _WITH_SLOTS if slots else _PLAIN
         found: dict[str, dict[str, Any]] = {}
         for begin in range(0, len(wanted), most):
             some = wanted[begin : begin + most]
@@ -128,6 +147,8 @@ class BacnetConnection:
 
     async def close(self) -> None:
         """End."""
+        if self._changes is not None:
+            await self._changes.close()
         if self._app is not None:
             self._app.close()
 

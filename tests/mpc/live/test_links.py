@@ -64,6 +64,56 @@ def test_a_device_is_read_written_and_given_back(device: Any) -> None:
     asyncio.run(work())
 
 
+def test_a_device_tells_what_changes(device: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Points are asked for until they are told; then one is, so that a device that is gone is seen."""
+    told = {"set": POINTS["set"], "other": ("analog-value,2", CELSIUS), "none": POINTS["none"]}
+    names, asked = list(told), list[set[str]]()
+    many = BacnetConnection._many
+
+    async def seen(self: Any, some: Any, slots: bool) -> Any:
+        asked.append(set(some))
+        return await many(self, some, slots)
+
+    monkeypatch.setattr(BacnetConnection, "_many", seen)
+
+    async def read_until(link: BacnetConnection, condition: Any) -> dict[str, Any]:
+        end = time.monotonic() + 20.0
+        while not condition(found := await link.read(names, slots=False)):
+            assert time.monotonic() < end, (found, asked[-3:])
+            await asyncio.sleep(0.05)
+        return found
+
+    async def work() -> None:
+        link = BacnetConnection(BacnetLink(kind="bacnet", address=device.address, timeout=0.5, cov=10.0), told)
+        await link.open()
+        try:
+            first = await link.read(names, slots=False)
+            assert asked == [set(names)] and first["none"]["error"]
+            assert first["set"]["value"] == first["other"]["value"] == pytest.approx(293.15)
+            # told: the first of them is asked for, and the one that no subscription is to be had of
+            await read_until(link, lambda _: asked[-1] in ({"set", "none"}, {"other", "none"}))
+            for number, value in ((1, 18.0), (2, 22.0)):
+                device.operate(number, value, 8)
+            given = await read_until(link, lambda f: [f[n]["value"] for n in ("set", "other")] == pytest.approx([291.15, 295.15]))
+            assert given["none"]["error"] and len(asked[-1]) == 2
+            device.wire.cut = True
+            gone = await link.read(names, slots=False)
+            assert all(one["error"] and one["value"] is None for one in gone.values())
+            device.wire.cut = False
+            for number in (1, 2):
+                device.operate(number, None, 8)
+            await read_until(link, lambda f: [f[n]["value"] for n in ("set", "other")] == pytest.approx([293.15] * 2))
+            # what has changed since is told again
+            await read_until(link, lambda _: len(asked[-1]) == 2)
+        finally:
+            device.wire.cut = False
+            begin = time.monotonic()
+            await link.close()
+            assert time.monotonic() - begin < 1.0
+
+    asyncio.run(work())
+
+
 def test_writes_on_the_wire_are_seen_by_other_code_than_the_clients(device: Any) -> None:
     written = [w for w in device.wire.journal if w.object == (2, 1)]
     assert [(w.property, w.priority) for w in written] == [(85, 13)] * len(written)
