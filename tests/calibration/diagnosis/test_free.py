@@ -73,6 +73,7 @@ def test_a_wrong_drawing_is_said_to_be_wrong_and_the_search_goes_on_without_it()
     assert diagnosis_verdict(found).startswith("The drawing does not hold")
 
 
+@pytest.mark.long
 def test_what_is_left_is_said_to_come_back_or_not() -> None:
     found = replace(diagnosed(), rounds=diagnosed().rounds[-1:])
     nothing = replace(found, verdict=replace(found.verdict, name="no_gap"))
