@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
-from calibration.fit.ladder import emitter_of
-from calibration.fit.left_out import Known
+from calibration.fit.ladder import fit_emitter
+from calibration.fit.left_out import Known, values_of
 from calibration.progress import Progress
 
 
@@ -30,9 +30,10 @@ def fit_baseline(
     """
     known = {name: tuple(zones) for name, zones in effects.items()}
     found = models.fit(known, [{}])
-    emitter = emitter_of(Known(found.weighed, found.model, found.point), models, known, progress)
-    if emitter == "air":
+    heated = fit_emitter(Known(found.weighed, found.model, found.point), models, known, progress)
+    if heated is None:
         return models, found
-    structure = replace(models.settings.structure, emitter=emitter)
-    models = replace(models, settings=replace(models.settings, structure=structure))
-    return models, models.fit(known, [{}])
+    settings = replace(models.settings, structure=heated.settings.structure)
+    # heated floors beside radiators: how far the shares of rooms differ is what the calibration has found
+    models = replace(models, settings=settings, weights=replace(heated.best.problem, effective=None))
+    return models, models.fit(known, [values_of(heated.best)])

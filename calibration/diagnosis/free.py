@@ -8,7 +8,7 @@ import numpy as np
 from calibration.diagnosis.decide.name import VerdictName
 from calibration.diagnosis.decide.verdict import Verdict
 from calibration.diagnosis.known import reasons_of
-from calibration.diagnosis.refit.comparison import Effects, ModelComparison
+from calibration.diagnosis.refit.comparison import Effects, Fit, ModelComparison
 from calibration.diagnosis.refit.refit import beyond_a_step, held_out
 from calibration.diagnosis.refit.search import Round, search
 from calibration.diagnosis.screen.regular import Regular, regular
@@ -17,6 +17,7 @@ from calibration.fit.ladder import CLOCK
 from calibration.fit.left_out import Known, values_of
 from calibration.fit.result import Rung
 from calibration.progress import Forward, Progress
+from thermal.case.building import GeometryQuality
 from thermal.effects.catalogue import CATALOGUE
 from thermal.network.structure import Structure
 
@@ -64,6 +65,23 @@ class Free:
     untestable: dict[str, str]
     left_over: Regular
     kept: FittedCase
+
+
+def held_against(rounds: Sequence[Round], quality: GeometryQuality) -> tuple[Fit, ...]:
+    """Models of the drawing of which a free structure must beat one: with what was found, and of a guess without it.
+
+    What differs between zones that nobody has measured looks like meters that are wrong or air between them.
+
+    Parameters
+    ----------
+    rounds : sequence of Round
+        Of the search about the drawing.
+    quality : {"surveyed", "approximate", "generic"}
+        How the geometry was come by.
+    """
+    final = rounds[-1].after
+    guessed = quality == "generic" and rounds[0].accepted is not None
+    return (rounds[0].before, final) if guessed else (final,)
 
 
 def drawing_fails(rungs: Sequence[Rung], kept: FittedCase | None) -> bool:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from calibration.diagnosis.baseline import fit_baseline
 from calibration.diagnosis.decide.verdict import Verdict, doubted, gains_of, judge
 from calibration.diagnosis.faults import Fault, mend, with_faults
-from calibration.diagnosis.free import Free, drawing_fails, search_free, with_recurring
+from calibration.diagnosis.free import Free, drawing_fails, held_against, search_free, with_recurring
 from calibration.diagnosis.handed_on import other_structures
 from calibration.diagnosis.known import reasons_of
 from calibration.diagnosis.refit.challenge import challenge
@@ -195,13 +195,16 @@ def seek(
     if about_drawing != "no_gap":
         # a drawing that is known to lack what nothing explains has no advance
         advance = 0.0 if about_drawing == "unexplained" else ADVANCE
-        structures = Structures(*other_structures(models, rounds[-1].after, whole.part(0.5), advance))
-        if structures.kept is not None and drawing_fails(structures.rungs, structures.kept):  # names make up for it
-            free = search_free(models, structures.kept, known, ruled_out, whole.part(0.6, "free structure"))
-            models, rounds, untestable, left_over = free.models, free.rounds, free.untestable, free.left_over
-            structures = structures._replace(kept=free.kept)
-        elif about_drawing == "unexplained" and rounds[0].accepted and not is_large(case.building.zone_names):
-            left_over = regular(models, rounds[-1].after)
+        for fit in held_against(rounds, case.building.geometry_quality):
+            structures = Structures(*other_structures(models, fit, whole.part(0.5), advance))
+            if structures.kept is not None and drawing_fails(structures.rungs, structures.kept):  # names make up for it
+                free = search_free(models, structures.kept, known, ruled_out, whole.part(0.6, "free structure"))
+                models, rounds, untestable, left_over = free.models, free.rounds, free.untestable, free.left_over
+                structures = structures._replace(kept=free.kept)
+                break
+        else:
+            if about_drawing == "unexplained" and rounds[0].accepted and not is_large(case.building.zone_names):
+                left_over = regular(models, rounds[-1].after)
     steps, floor = how_far(models, rounds)
     verdict = doubted(judge(rounds, untestable, left_over), {s.effects[-1] for s in steps if s.void})
     if free is not None and structures is not None:

@@ -87,10 +87,10 @@ def climb(drawn: FittedCase, began: float, progress: Progress | None = None) -> 
     return replace(result, rungs=rungs, uncalibrated=drawn.uncalibrated(whole.part(1.0)))
 
 
-def emitter_of(
+def fit_emitter(
     fitted: Fitted, given: Tuned, known: Mapping[str, Sequence[str]], progress: Progress | None = None
-) -> Unknown:
-    """Find what a building as drawn is best taken to give its heat by, where the case does not say it.
+) -> FittedCase | None:
+    """Fit a building as drawn with what it is best taken to give its heat by, where the case does not say it.
 
     Parameters
     ----------
@@ -102,20 +102,25 @@ def emitter_of(
         Effects that the fitted model has, with their zones: so have all that it is weighed against.
     progress : callable, optional
         Called with stage, done, total.
+
+    Returns
+    -------
+    FittedCase or None
+        With heated floors or radiators; None where all of the heat had better be in the air.
     """
     ladder = _Ladder(given, Forward(progress), replace(given.calibration, starts=1, effects=known))
     if is_large(given.case.building.zone_names) or not ladder.guesses:
-        return "air"
+        return None
     looked = [ladder.look("drawn", fitted)]
     looked += ladder.emitters(fitted, looked[0].left.mae)
     best = looked[_best(looked, ADVANCE)]
     if best.fit is None:
-        return "air"
+        return None
     # a drawing that is wrong altogether is better with anything slow
     source = telemetry_inputs(given.case)
     lumped = ladder.solve(replace(ladder.base, structure=Structure(lumped=True, sun=source.measured(IRRADIANCE))))
     wrong = ladder.look("lumped", lumped.best).left.mae < (1.0 - ADVANCE) * best.left.mae
-    return "air" if wrong else best.fit.settings.structure.emitter
+    return None if wrong else best.fit
 
 
 class Tuned(Protocol):

@@ -144,6 +144,7 @@ def test_do_mpc_stands_beside_ours_on_its_days_only(tables: ModuleType) -> None:
     assert tables.peers(runs[:1]) == ""
 
 
+@pytest.mark.long
 def test_do_mpc_predicts_as_ours_does(
     script: Callable[[str], ModuleType], case: ModuleType, comparison: ModuleType
 ) -> None:

@@ -59,7 +59,7 @@ def challenge(
     if len(zones) < 2 or is_large(zones) or not scopes or name == "no_gap" or _MASS in final.effects:
         return models, tuple(rounds)
     settings = replace(models.settings, scopes={**models.settings.scopes, **scopes})
-    zoned = ModelComparison(models.case, settings, models.tuned, models.judged, models.horizon)
+    zoned = replace(models, settings=settings, tune=models.tuned, hold_out=models.judged)
     known = dict(rounds[0].before.effects)
     try:
         for effects, least in _rivals(rounds, known):

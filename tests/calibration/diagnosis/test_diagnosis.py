@@ -70,6 +70,7 @@ def test_nothing_is_found_where_nothing_is_missing() -> None:
     assert found.final.effects == {}
 
 
+@pytest.mark.long
 def test_the_answer_is_that_of_the_whole_diagnosis() -> None:
     answer, whole = plain(seek(twin(), dx=1.0).to_dict()), plain(diagnosed(None).to_dict())
     assert answer["gap"].items() <= whole["gap"].items()

@@ -10,8 +10,9 @@ import pytest
 
 from calibration.diagnosis.decide.verdict import chance_of, judge
 from calibration.diagnosis.diagnosis import Diagnosis, baseline_gap, diagnose
-from calibration.diagnosis.free import Free, drawing_fails, recurs, with_recurring
+from calibration.diagnosis.free import Free, drawing_fails, held_against, recurs, with_recurring
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
+from calibration.diagnosis.refit.search import Round
 from calibration.diagnosis.screen.regular import Regular, regular
 from calibration.evaluation.settings import ModelSettings
 from calibration.fit.fitted_case import FittedCase
@@ -72,6 +73,7 @@ def test_a_wrong_drawing_is_said_to_be_wrong_and_the_search_goes_on_without_it()
     assert diagnosis_verdict(found).startswith("The drawing does not hold")
 
 
+@pytest.mark.long
 def test_what_is_left_is_said_to_come_back_or_not() -> None:
     found = replace(diagnosed(), rounds=diagnosed().rounds[-1:])
     nothing = replace(found, verdict=replace(found.verdict, name="no_gap"))
@@ -110,6 +112,15 @@ def test_a_structure_that_is_hardly_better_leaves_the_drawing_in_place() -> None
 def baseline(case: Case) -> tuple[ModelComparison, Fit]:
     models = ModelComparison(case, ModelSettings(dx=1.0))
     return models, models.fit({}, [{}])
+
+
+def test_a_guessed_drawing_may_not_defend_itself_by_what_was_found() -> None:
+    first = SimpleNamespace(before="drawn", after="with one", accepted="one")
+    rounds = cast(list[Round], [first, SimpleNamespace(before="with one", after="with two", accepted="two")])
+    assert held_against(rounds, "surveyed") == held_against(rounds, "approximate") == ("with two",)
+    assert held_against(rounds, "generic") == ("drawn", "with two")
+    nothing = cast(list[Round], [SimpleNamespace(before="drawn", after="drawn", accepted=None)])
+    assert held_against(nothing, "generic") == ("drawn",)
 
 
 def test_nothing_comes_back_where_nothing_is_missing() -> None:

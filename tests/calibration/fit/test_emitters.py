@@ -9,6 +9,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from calibration.diagnosis.baseline import fit_baseline
+from calibration.diagnosis.refit.comparison import ModelComparison
+from calibration.diagnosis.refit.refit import held_out
 from calibration.fit.calibrate import calibrate
 from calibration.fit.result import CalibrationResult
 from mpc.reports.calibration import calibration_verdict
@@ -88,6 +91,12 @@ def test_a_heated_floor_is_found_and_where_it_is() -> None:
     told = calibrate(replace(case, building=house("floor", "radiator")), settings={"starts": 1})
     assert not any(p.base == "floor_heat_share" for p in told.parameters)
     assert told.calibrated["held_out"].metrics.mae < 1.1 * found.calibrated["held_out"].metrics.mae < 0.2
+
+
+def test_the_baseline_of_a_diagnosis_knows_rooms_with_radiators_from_those_with_heated_floors() -> None:
+    models, fit = fit_baseline(ModelComparison(twin("floor", "radiator")), {})
+    assert fit.values["floor_heat_share@below"] > 0.9 > 0.3 > fit.values["floor_heat_share@above"]
+    assert held_out(models, fit).mae < 0.2
 
 
 def test_radiators_are_no_floors() -> None:

@@ -50,6 +50,7 @@ def test_a_killed_process_loses_nothing(finished: Finished, check_nothing_is_los
         os.kill(finished[2], 0)
 
 
+@pytest.mark.long
 def test_a_worker_finds_what_calibrate_finds(cases: Path, finished: Finished) -> None:
     result = calibrate(load_case(cases / "office 1"), settings=CalibrationSettings(horizon="1h", starts=1))
     content = json.loads((finished[0] / "office 1" / "calibration.json").read_text(encoding="utf-8"))

@@ -69,7 +69,7 @@ def follow(batch: BatchedPlant, which: list[int], seeds: list[int], steps: int, 
     return worst
 
 
-@pytest.mark.parametrize(("dtype", "bound"), [(np.float64, EXACT), (np.float32, SINGLE)])
+@pytest.mark.parametrize(("dtype", "bound"), [(np.float64, EXACT), pytest.param(np.float32, SINGLE, marks=pytest.mark.long)])
 def test_a_week_is_that_of_the_single_plant(dtype: Any, bound: float) -> None:
     plant = plant_of()
     batch = BatchedPlant(plant, 3, dtype=dtype)

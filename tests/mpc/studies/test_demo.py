@@ -53,6 +53,7 @@ def test_each_step_leaves_a_page_and_the_first_page_leads_to_all(demo: tuple[Dem
         run_demo(folder)
 
 
+@pytest.mark.long
 def test_the_numbers_are_those_of_the_steps(demo: tuple[Demo, list[str]]) -> None:
     found, _ = demo
     folder = found.pages["check"].parents[1]

@@ -56,6 +56,7 @@ def test_own_control_is_energyplus_alone(own, alone):
         assert energy == pytest.approx(alone[name], rel=1e-6, abs=1.0), name
 
 
+@pytest.mark.long
 def test_its_own_setpoints_as_actions_change_nothing(own, make_plant):
     plant = make_plant(control_steps=3)
     plant.reset()
