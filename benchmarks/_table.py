@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,14 @@ def markdown(columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
 
     lines = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
     return "\n".join([*lines, *("| " + " | ".join(cell(v) for v in row) + " |" for row in rows)]) + "\n"
+
+
+def keep(path: Path, data: Any) -> None:
+    """Write the JSON of a finished run, whole or not at all: a run that is interrupted goes on without it."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_suffix(".part")
+    part.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+    os.replace(part, path)
 
 
 def write(out: Path, name: str, table: str, data: Any, published: bool) -> None:

@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import sys
 from pathlib import Path
 from typing import Any
@@ -25,7 +24,7 @@ import numpy as np
 import pandas as pd
 from _code import code
 from _foreign_runs import conformal_of, drive
-from _table import markdown, write
+from _table import keep, markdown, write
 from foreign_models.plants import PLANTS
 
 from mpc.control.identified.conformal import Guarantee
@@ -52,10 +51,7 @@ def perform(name: str, share: float, out: Path, days: int, finished: bool) -> di
             if finished:
                 break
             kept = pieces[-1]["kept"] if pieces and share else None
-            path.parent.mkdir(parents=True, exist_ok=True)
-            part = path.with_suffix(".part")
-            part.write_text(json.dumps(piece(name, share, out, start, days, kept), indent=1) + "\n", encoding="utf-8")
-            os.replace(part, path)
+            keep(path, piece(name, share, out, start, days, kept))
         pieces.append(dict(json.loads(path.read_text(encoding="utf-8"))))
         print(f"{name} {share:g} from {start}: {100.0 * seen(pieces[-1:]):.2f} %", flush=True)
     if not pieces:

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import sys
 from pathlib import Path
 from typing import Any
@@ -22,7 +21,7 @@ from typing import Any
 import pandas as pd
 from _code import code
 from _foreign_runs import account, drive, identified
-from _table import markdown, write
+from _table import keep, markdown, write
 from foreign_models.drawn import drawn_plants
 from foreign_models.periods import starts
 from foreign_models.plants import ALL
@@ -53,10 +52,7 @@ def perform(name: str, out: Path, days: int) -> dict[str, Any]:
         raise
     except MpcError as error:
         data["failure"] = f"{stage}: {error}"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_suffix(".part")
-    part.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
-    os.replace(part, path)
+    keep(path, data)
     return data
 
 

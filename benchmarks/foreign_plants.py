@@ -25,14 +25,13 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import os
 import sys
 from pathlib import Path
 from typing import Any
 
 from _code import code
 from _foreign_runs import CONTROLLERS, run
-from _table import markdown, write
+from _table import keep, markdown, write
 from foreign_models.plants import PLANTS
 
 from mpc.errors import EnergyPlusError, MpcError
@@ -80,10 +79,7 @@ def perform(name: str, which: str, controller: str, out: Path) -> dict[str, Any]
         raise
     except MpcError as error:
         data["failure"] = str(error)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_suffix(".part")
-    part.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
-    os.replace(part, path)
+    keep(path, data)
     return data
 
 

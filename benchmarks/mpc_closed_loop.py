@@ -25,14 +25,13 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import os
 import time
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from _table import markdown, publish, write
+from _table import keep, markdown, publish, write
 from simulator_speed import use_one_thread
 
 from mpc.loop.make import pilot_weather
@@ -99,10 +98,7 @@ def gather(options: argparse.Namespace) -> list[dict[str, Any]]:
         for controller in options.controllers:
             file = folder / f"{season}_{controller}_{options.days:g}d_{options.zones}z_{options.price:g}.json"
             if not file.exists() and not options.no_run:
-                text = json.dumps(run(season, controller, options), indent=1) + "\n"
-                part = file.with_suffix(".part")
-                part.write_text(text, encoding="utf-8")
-                os.replace(part, file)
+                keep(file, run(season, controller, options))
                 print(f"{season} {controller}: done", flush=True)
             if file.exists():
                 rows.append(json.loads(file.read_text(encoding="utf-8")))

@@ -26,7 +26,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import time
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
@@ -38,7 +37,7 @@ from _comparison_tables import PRICES, draw_front, draw_learning, short, table
 from _office_site import SMOKE, OfficeSite
 from _site import Site
 from _sites import SITES
-from _table import publish, write
+from _table import keep, publish, write
 from simulator_speed import use_one_thread
 
 PICTURES = Path(__file__).parents[1] / "docs" / "images"
@@ -48,11 +47,7 @@ Job = tuple[Entry, str, Site, Path]
 
 def perform(job: Job, file: Path) -> None:
     """Do a run and write it down, whole or not at all."""
-    text = json.dumps(run(*job), indent=1) + "\n"
-    file.parent.mkdir(parents=True, exist_ok=True)
-    part = file.with_suffix(".part")
-    part.write_text(text, encoding="utf-8")
-    os.replace(part, file)
+    keep(file, run(*job))
 
 
 def gather(jobs: dict[Path, Job], processes: int) -> list[dict[str, Any]]:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from energyplus_trials.frame import Objects
 
 from foreign_models.flats import Flat, flats
 from foreign_models.flats import description as of_flats
+from foreign_models.foreign_plant import ForeignPlant
 from foreign_models.heat_pump import HeatPump
 from foreign_models.house import House, house
 from foreign_models.house import description as of_house
@@ -28,23 +29,14 @@ PLACES = (
 )  # fmt: skip
 
 
-class Drawn(NamedTuple):
-    """A building that was drawn: what `ForeignPlant` is made of."""
-
-    about: str
-    model: Callable[[], Objects]
-    description: Callable[[], dict[str, Any]]
-    weather: str
-
-
-def drawn_plants() -> dict[str, Drawn]:
+def drawn_plants() -> dict[str, ForeignPlant]:
     """Draw the buildings by name; the same whatever is done with them."""
     found = {}
     for number in range(3 * EACH):
         rng = np.random.default_rng([SEED, number])
         draw = (_house, _flats, _shop)[number % 3]
         about, model, description = draw(rng)
-        found[f"drawn_{number + 1}"] = Drawn(about, model, description, str(rng.choice(PLACES)))
+        found[f"drawn_{number + 1}"] = ForeignPlant(about, model, description, str(rng.choice(PLACES)))
     return found
 
 

@@ -5,52 +5,26 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import yaml
-from energyplus_trials.frame import STEPS_PER_HOUR, Objects
+from energyplus_trials.frame import STEPS_PER_HOUR
 
 from foreign_models import flats, house, office, shop
 from foreign_models.drawn import drawn_plants
+from foreign_models.foreign_plant import ForeignPlant
 from foreign_models.periods import DAYS, WARM_UP, starts
 from foreign_models.prices import dynamic_prices
 from mpc.adapters.energyplus.input import weather_path
 from mpc.scenario.weather_files import read_epw
 
-#: What EnergyPlus brings is American. Of its places this one is nearest to Brussels in winter: 2,590 degree-days below
-#: 18 degC (Brussels-Uccle 2,700), October to April 6.2 degC in the mean (6.9); its sun is higher and its summer hotter.
-TEMPERATE = "USA_VA_Sterling-Washington.Dulles.Intl.AP.724030_TMY3"
 STATION = {
     "outside_air_temperature_sensor": "Site Outdoor Air Drybulb Temperature",
     "direct_normal_irradiance_sensor": "Site Direct Solar Radiation Rate per Area",
     "diffuse_horizontal_irradiance_sensor": "Site Diffuse Solar Radiation Rate per Area",
     "wind_speed_sensor": "Site Wind Speed",
 }
-
-
-@dataclass(frozen=True)
-class ForeignPlant:
-    """A plant to develop on.
-
-    Parameters
-    ----------
-    about : str
-        In words.
-    model : callable
-        Makes EnergyPlus' input.
-    description : callable
-        Gives what ``plant.yaml`` says of zones, points and actuators.
-    weather : str
-        Of those that EnergyPlus brings.
-    """
-
-    about: str
-    model: Callable[[], Objects]
-    description: Callable[[], dict[str, Any]]
-    weather: str = TEMPERATE
 
 
 PLANTS = {
@@ -67,7 +41,7 @@ PLANTS = {
 }
 
 #: Those of the table, and twelve that are drawn.
-ALL = PLANTS | {name: ForeignPlant(*told) for name, told in drawn_plants().items()}
+ALL = PLANTS | drawn_plants()
 
 
 def describe(name: str, errors: str = "day_ahead") -> dict[str, Any]:
