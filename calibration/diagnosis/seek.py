@@ -202,9 +202,9 @@ def seek(
                 models, rounds, untestable, left_over = free.models, free.rounds, free.untestable, free.left_over
                 structures = structures._replace(kept=free.kept)
                 break
-        else:
-            if about_drawing == "unexplained" and rounds[0].accepted and not is_large(case.building.zone_names):
-                left_over = regular(models, rounds[-1].after)
+        small = not is_large(case.building.zone_names)
+        if free is None and about_drawing == "unexplained" and rounds[0].accepted and small:
+            left_over = regular(models, rounds[-1].after)
     steps, floor = how_far(models, rounds)
     verdict = doubted(judge(rounds, untestable, left_over), {s.effects[-1] for s in steps if s.void})
     if free is not None and structures is not None:

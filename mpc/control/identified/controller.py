@@ -23,7 +23,7 @@ from mpc.control.identified.observer import GreyBoxObserver
 from mpc.control.identified.problem import SCALE, IdentifiedProblem
 from mpc.control.identified.thermostats import Thermostats
 from mpc.control.solvers.solution import Status
-from mpc.control.solvers.stages import StageSolution, StageSolver
+from mpc.control.solvers.stages import StageData, StageSolution, StageSolver
 from mpc.errors import ControlError
 from mpc.identify.maps import MachineMap
 from mpc.identify.model import PlantModel
@@ -247,9 +247,9 @@ class IdentifiedController:
         best: StageSolution | None = None
         whole = [k for k, found in enumerate(self.model.maps) if found.operation == "duty"]
         if whole and self.settings.runs == "mixed_integer":
-            best = self._mixed(ahead, whole, (low, high))
-            if best is not None:
-                return best
+            planned = self._mixed(ahead, whole, (low, high))
+            if planned is not None:
+                return planned
         for k in whole:
             choices = []
             for on in self._possible(k):
@@ -274,11 +274,10 @@ class IdentifiedController:
             runs = self._runs[k]
             bound, price = max(self._hold - runs.since, 0), SCALE * self.settings.start_price
             limits.append(RunLimits(k, runs.on, bound, self._hold, runs.left, self._back, price))
-        data = self._problem.data(self._observer.state, ahead, self._kept, self.settings.comfort_price, ends, self._now)
         # loads as the problem counts them, within their ends; those of machines that are run whole are from 0 to 1
         shares, m = relaxed.decisions.copy(), len(self.model.maps)
         shares[:, :m] = np.divide(shares[:, :m], ends[1], out=np.zeros_like(ends[1]), where=ends[1] > 0.0)
-        chosen = self._planner.plan(data, relaxed.states, shares, limits)
+        chosen = self._planner.plan(self._data(ahead, ends), relaxed.states, shares, limits)
         if chosen is None:
             return None
         low, high = ends[0].copy(), ends[1].copy()
@@ -315,12 +314,17 @@ class IdentifiedController:
             return 0.0
         return price / max(runs.since, 1) if runs.on else price
 
+    def _data(self, ahead: Ahead, ends: tuple[FloatArray, FloatArray]) -> StageData:
+        """Fill the problem in, from the state that is estimated."""
+        price = self.settings.comfort_price
+        return self._problem.data(self._observer.state, ahead, self._kept, price, ends, self._now)
+
     def _solve(self, ahead: Ahead, ends: tuple[FloatArray, FloatArray]) -> StageSolution | None:
         """Plan within ends of the decisions; they are then duties and loads themselves."""
-        state, solver = self._observer.state, self._solver
+        solver = self._solver
         if solver is None:
             return None
-        data = self._problem.data(state, ahead, self._kept, self.settings.comfort_price, ends, self._now)
+        data = self._data(ahead, ends)
         guess = np.full((len(ahead.outdoor), self._problem.decisions), _HALF)
         if self._plan is not None:
             guess = self._plan.shifted()[1]
