@@ -66,8 +66,9 @@ def test_fifty_drills(drills: ModuleType, script: Callable[[str], ModuleType], t
     assert set(times) == set(script("_drill_faults").FAULTS) and sum(times.values()) == 50
     for one in found["drills"]:
         assert not one["bad_writes"] and not one["overridden"] and not one["not_back"], one
-    # a control step is 1.5 s: a machine that stands still for a second makes one late
-    assert sum(bool(one["late"]) for one in found["drills"]) <= 1, drills.report(found)
+    # a control step is 1.5 s: a machine that stands still for a second makes one late, which is not given back never
+    late = [one for one in found["drills"] if one["late"]]
+    assert len(late) <= 1 and all(one["steps"] is not None for one in late), drills.report(found)
     assert found["lost"] == 0 and found["samples"] > 1000 and found["writes"] > 150
     assert found["not_replayed"] == [] and found["decisions"] > 500
     assert "| all | 50 | 0 | 0 |" in drills.report(found)
