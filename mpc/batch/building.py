@@ -1,6 +1,6 @@
 """Reduced buildings of many members, stepped in their modes: shared by all, or each with its own."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from mpc.loop.reduced import ReducedBuilding
 from thermal._types import FloatArray, IntArray
+from thermal.batch.trace import Tape, Traced
 
 Array = NDArray[Any]
 
@@ -71,94 +72,90 @@ class BatchedBuilding:
 
     Notes
     -----
-    Of one building all members are columns of the products. Where members have different ones each has modes of its
-    own: a stack of matrices, each times a vector, so that a step reads them all from memory (measured by
-    ``benchmarks/environment_speed.py``).
+    Of one building all members are columns of the products, noted on a tape as the rest of a step is. Where members
+    have different ones each has modes of its own: a stack of matrices, each times a vector, so that a step reads them
+    all from memory (measured by ``benchmarks/environment_speed.py``).
     """
 
     def __init__(self, models: Sequence[ReducedBuilding], members: int, dtype: Any) -> None:
-        self._all, self.shared, self._dtype = Modes.of(models), len(models) == 1, np.dtype(dtype)
-        order = self._all.end.shape[1]
-        #: States, shape (r, member), or (member, r) where each has modes of its own.
-        self.state = np.zeros((order, members) if self.shared else (members, order), self._dtype)
-        own = Modes(*(values[0] if self.shared else np.repeat(values[:1], members, axis=0) for values in self._all))
-        self._own = Modes(*(np.ascontiguousarray(values, dtype=self._dtype) for values in own))
-        self._moved = np.zeros_like(self.state)
-        if self.shared:  # readings at a step's end, and changes of modes over it, in one product each
-            one = Modes(*(values[0] for values in self._all))
-            parts = one.output * one.end, one.output @ one.driving, np.hstack([one.heating, one.driving])
-            self._left, self._led, self._moving = (np.ascontiguousarray(part, self._dtype) for part in parts)
-            self._given = np.zeros((self._moving.shape[1], members), self._dtype)
-        else:
-            self._free = np.zeros_like(self.state)
+        self._all, self.shared = Modes.of(models), len(models) == 1
+        #: Number of modes.
+        self.order = self._all.end.shape[1]
+        if not self.shared:
+            own = (np.repeat(values[:1], members, axis=0) for values in self._all)
+            self._own = Modes(*(np.ascontiguousarray(values, dtype=dtype) for values in own))
+            self._state, self._free = (np.zeros((members, self.order), dtype) for _ in range(2))
 
-    def start(self, members: IntArray, models: IntArray, states: Sequence[FloatArray]) -> None:
-        """Set members to the states of their buildings.
+    def start(self, members: IntArray, model: int, state: FloatArray, modes: Array) -> None:
+        """Set members to a state of a building.
 
         Parameters
         ----------
-        members, models : ndarray of int, shape (n,)
-            Which members, and which building each has.
-        states : sequence of ndarray, shape (r,)
-            One a building [-].
+        members : ndarray of int, shape (n,)
+            Which.
+        model : int
+            Which building they have.
+        state : ndarray, shape (r,)
+            Its modes [-].
+        modes : ndarray, shape (order, member) or (0, member)
+            The modes of all that were traced; filled where members share one building [-].
         """
-        for member, model in zip(members.tolist(), models.tolist(), strict=True):
-            row = np.zeros(self._all.end.shape[1])
-            row[: states[model].size] = states[model]
-            if self.shared:
-                self.state[:, member] = row
-                continue
-            self.state[member] = row
-            for own, every in zip(self._own, self._all, strict=True):
-                own[member] = every[model]
-
-    def begin(self, gains: Array, outside: Array, out: Array) -> None:
-        """Begin a step: readings at its end without the plant's heat, counted from the reference temperature.
-
-        Parameters
-        ----------
-        gains : ndarray, shape (n_zone, member or 1)
-            Heat of people, light and equipment [W].
-        outside : ndarray, shape (n_outside, member or 1)
-            Boundaries counted from the reference temperature [K], then signals.
-        out : ndarray, shape (n_zone, member)
-            Filled [K].
-        """
-        own = self._own
+        row = np.pad(state, (0, self.order - state.size))
         if self.shared:
-            np.matmul(self._left, self.state, out=out)
-            np.add(out, self._led @ outside + own.response @ gains, out=out)
+            modes[:, members] = row[:, None]
             return
-        kept = self._free
-        np.multiply(self.state, own.end, out=kept)
+        self._state[members] = row
+        for own, every in zip(self._own, self._all, strict=True):
+            own[members] = every[model]
+
+    def traced(self, tape: Tape, modes: Traced, gains: Traced, outside: Traced) -> tuple[Traced, Callable[..., Traced]]:
+        """Note a step: readings at its end without the plant's heat, and what takes the step with that heat.
+
+        Parameters
+        ----------
+        tape : Tape
+            Where it is noted.
+        modes : Traced, shape (order,) or (0,)
+            At the start, where members share one building [-]; written to.
+        gains : Traced, shape (n_zone,)
+            Heat of people, light and equipment [W].
+        outside : Traced, shape (n_outside,)
+            Boundaries counted from the reference temperature [K], then signals.
+
+        Returns
+        -------
+        free : Traced, shape (n_zone,)
+            Counted from the reference temperature [K].
+        finish : callable
+            Takes the plant's heat into the zones [W]; gives the readings, counted from the reference temperature [K].
+        """
+        if not self.shared:
+            free = tape.call(self._begin, [gains, outside], len(gains))
+            return free, lambda heat: tape.call(self._finish, [heat, gains, free], len(gains))
+        one = Modes(*(values[0] for values in self._all))
+        left, led = one.output * one.end, one.output @ one.driving
+        free = left @ modes + (led @ outside + one.response @ gains)
+
+        def finish(heat: Traced) -> Traced:
+            given = np.concatenate([heat + gains, outside])  # one product for all that moves the modes
+            modes[...] = modes * one.end + np.hstack([one.heating, one.driving]) @ given
+            reached: Traced = one.response @ heat + free
+            return reached
+
+        return free, finish
+
+    def _begin(self, gains: Array, outside: Array, out: Array) -> None:
+        """Begin a step of members with buildings of their own; see `traced`."""
+        own, kept = self._own, self._free
+        np.multiply(self._state, own.end, out=kept)
         kept += _each(own.driving, outside, len(kept))
         np.add(_each(own.output, kept.T, len(kept)).T, _each(own.response, gains, len(kept)).T, out=out)
 
-    def finish(self, heat: Array, gains: Array, outside: Array, free: Array, out: Array) -> None:
-        """Take the step that was begun.
-
-        Parameters
-        ----------
-        heat : ndarray, shape (n_zone, member)
-            Of the plant [W].
-        gains, outside, free : ndarray
-            As `begin` had and gave them [W], [K].
-        out : ndarray, shape (n_zone, member)
-            Readings at the end of the step, counted from the reference temperature; filled [K].
-        """
-        own = self._own
-        if self.shared:
-            given, count = self._given, len(heat)
-            np.add(heat, gains, out=given[:count])
-            np.copyto(given[count:], outside)
-            np.matmul(self._moving, given, out=self._moved)
-            np.multiply(self.state, own.end[:, None], out=self.state)
-            np.add(self.state, self._moved, out=self.state)
-            np.matmul(own.response, heat, out=out)
-        else:
-            np.add(self._free, _each(own.heating, heat + gains, len(self.state)), out=self.state)
-            out[...] = _each(own.response, heat, len(self.state)).T
-        np.add(out, free, out=out)
+    def _finish(self, heat: Array, gains: Array, free: Array, out: Array) -> None:
+        """Take the step that was begun."""
+        own, state = self._own, self._state
+        np.add(self._free, _each(own.heating, heat + gains, len(state)), out=state)
+        np.add(_each(own.response, heat, len(state)).T, free, out=out)
 
 
 def _each(matrices: Array, columns: Array, members: int) -> Array:

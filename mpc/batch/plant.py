@@ -85,7 +85,6 @@ class BatchedPlant:
         self._building = BatchedBuilding(models, members, dtype)
         self._traced = TracedStep(
             first, self._rows.parts, self._rows.width, self._rows.each, self.actions, self._building, score,
-            len(models) > 1,
         )  # fmt: skip
         self._program = Program(self._traced.tape, members, dtype, compiled)
         noise = first.sensors.noise
@@ -213,7 +212,7 @@ class BatchedPlant:
 
     def _set_out(self, number: int, who: IntArray, warm: LoopState) -> None:
         plant, (state, _) = self.plants[number], warm.building
-        self._building.start(who, np.full(len(who), self._model_of[number]), [state] * (self._model_of[number] + 1))
+        self._building.start(who, int(self._model_of[number]), state, self._set("modes"))
         columns = {
             "reading": warm.reading - REFERENCE_TEMPERATURE, "missed": warm.missed,
             "cycling": np.array(warm.cycling, dtype=float), "states": np.array(warm.hvac.values),
