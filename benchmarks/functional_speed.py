@@ -1,14 +1,15 @@
 """Steps of the functional environment a second, and proximal policy optimisation in it: on one core, and on a GPU.
 
-Steps are those of `environment_speed.py`, with the noise drawn by JAX: random actions, measurements, forecast, clock and
-reward, many members at once. The training is that of `mpc.environment.ppo` with its own settings on the office of 12
-zones, all of it in one compiled function. What is compiled beforehand is not in the times; it stands beside them.
+Steps are those of `environment_speed.py`, with the noise drawn by JAX: random actions, measurements, forecast, clock
+and reward, many members at once. The training is that of `mpc.environment.ppo` with its own settings on the office of
+12 zones, all of it in one compiled function. What is compiled beforehand is not in the times; it stands beside them.
 
 ``--export DIR`` writes the functions and what they read to files instead, and ``--run DIR`` runs such files where
 nothing but JAX and NumPy is installed, on whatever device JAX finds there. Without either both are done here.
 
-Run: ``python benchmarks/functional_speed.py --out results/functional [--rounds 610] [--publish NAME]`` (extras ``[jax]``,
-``[rl]``); 610 rounds are 20 million steps. Writes ``functional_speed.json`` and ``.md``.
+Run: ``python benchmarks/functional_speed.py --out results/functional --publish functional_cpu`` (extras ``[jax]``,
+``[benchmarks]``); twelve minutes, most of them for 610 rounds of training, which are 20 million steps. Writes the
+table's name as ``.json`` and ``.md``.
 """
 
 from __future__ import annotations
@@ -141,7 +142,8 @@ def table(found: dict[str, dict[str, Any]]) -> str:
         rows.append([told["zones"], what, f"{told['members']:,}", f"{told['steps']:,}", f"{seconds:.3g}",
                      f"{told['steps'] / seconds:,.0f}", f"{told['compiled in [s]']:.0f}"])  # fmt: skip
     device = next(iter(found.values()))["device"]
-    where = f"One core, CPU time; load average {os.getloadavg()[0]:.1f}." if device == "cpu" else f"{device}, wall time."
+    load = f"One core, CPU time; load average {os.getloadavg()[0]:.1f}."
+    where = load if device == "cpu" else f"{device}, wall time."
     columns = ("zones", "what", "members", "steps", "s", "steps a second", "compiled in [s]")
     return markdown(columns, rows) + f"\nSteps of 5 minutes, single precision. {where}\n"
 
