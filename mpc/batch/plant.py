@@ -1,7 +1,6 @@
 """Many plants of one structure, stepped together."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from mpc.batch.alike import checked_plants, different_models
 from mpc.batch.building import Array, BatchedBuilding
 from mpc.batch.inputs import DrawnNoise, DrivingRows, people_rows, plant_rows
-from mpc.batch.step import Score, StepInputs, TracedStep
+from mpc.batch.step import Score, TracedStep
 from mpc.errors import PlantActionError, PlantError
 from mpc.kpi.record import PlantRecord
 from mpc.loop.loop import LoopState
@@ -19,6 +18,7 @@ from mpc.loop.reduced import ReducedBuilding
 from mpc.loop.simulated import SimulatedPlant
 from thermal._types import FloatArray, IntArray
 from thermal.batch.program import Program
+from thermal.batch.trace import Traced
 from thermal.units import REFERENCE_TEMPERATURE
 
 
@@ -84,7 +84,7 @@ class BatchedPlant:
         models, self._model_of = different_models([p.model for p in self.plants])  # type: ignore[misc]
         own = ("gains", "people", "outside") if self._random_people else ()
         self._rows = DrivingRows([plant_rows(p) for p in self.plants], members, own, dtype)
-        self._building = BatchedBuilding(models, members, dtype)
+        self._building = BatchedBuilding(models)
         #: The step that was traced.
         self.traced = TracedStep(
             first, self._rows.parts, self._rows.width, self._rows.each, self.actions, self._building, score,
@@ -136,9 +136,15 @@ class BatchedPlant:
     def _set(self, name: str) -> Array:
         return self._program.of(getattr(self.traced.inputs, name))
 
-    def inputs(self) -> dict[str, Array]:
-        """Give what the next step begins with, by names of `StepInputs`; the next step writes to it."""
-        return {f.name: self._set(f.name) for f in fields(StepInputs)}
+    def of(self, value: Traced) -> Array:
+        """Give a value of `traced` as it is, shape (..., member or 1); the next step writes to it.
+
+        Parameters
+        ----------
+        value : Traced
+            An input or a result.
+        """
+        return self._program.of(value)
 
     def rows(self) -> Array:
         """Give what drives members from their reset on, shape (n_steps, width, member or 1), as `TracedStep.part`."""
@@ -236,7 +242,8 @@ class BatchedPlant:
 
     def _set_out(self, number: int, who: IntArray, warm: LoopState) -> None:
         plant, (state, _) = self.plants[number], warm.building
-        self._building.start(who, int(self._model_of[number]), state, self._set("modes"))
+        matrices = [self._program.of(value) for value in self.traced.inputs.matrices]
+        self._building.start(who, int(self._model_of[number]), state, self._set("modes"), matrices)
         columns = {
             "reading": warm.reading - REFERENCE_TEMPERATURE, "missed": warm.missed,
             "cycling": np.array(warm.cycling, dtype=float), "states": np.array(warm.hvac.values),

@@ -42,8 +42,10 @@ class StepInputs:
         1 for those that run since a zone has drifted [-].
     states : Traced, shape (n_state,)
         Of the system [unit of the state].
-    modes : Traced, shape (order,) or (0,)
-        Of the building, where members share one [-].
+    modes : Traced, shape (order,)
+        Of the building [-].
+    matrices : tuple of Traced
+        Of `StepMatrices`, where members have buildings of their own.
     """
 
     row: Traced
@@ -56,6 +58,7 @@ class StepInputs:
     cycling: Traced
     states: Traced
     modes: Traced
+    matrices: tuple[Traced, ...]
 
 
 @dataclass(eq=False)
@@ -123,7 +126,7 @@ class TracedStep:
             tape.value(0 if noise is None else noise.width), tape.value(n), tape.value(n),
             tape.value(n, each=not self.building.shared), tape.value(n, each=not self.building.shared),
             tape.value(len(system.air_handlers)), tape.value(len(system.states)),
-            tape.value(self.building.order if self.building.shared else 0),
+            tape.value(self.building.order), self.building.matrices(tape),
         )  # fmt: skip
         self.results = self._trace(TracedOperations(tape))
 
@@ -144,7 +147,7 @@ class TracedStep:
         asked = {name: given.actions[k] for k, name in enumerate(self.actions)}
         heating, cooling = self._setpoints(asked)
         runs, cycling = self._runs(ops, heating, cooling)
-        free, finish = self.building.traced(tape, given.modes, part("gains"), part("outside"))
+        free, finish = self.building.traced(given.matrices, given.modes, part("gains"), part("outside"))
         actions, supply, reach = schedule.switched(ops, asked, runs, part("ventilation")[0])
         local = LocalControl(system, given.response)  # type: ignore[arg-type]
         air = np.stack([s - REFERENCE_TEMPERATURE for s in supply]) if supply else np.zeros(0)

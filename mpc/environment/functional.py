@@ -66,8 +66,8 @@ class FunctionalEnvironment:
     Parameters
     ----------
     worlds : VectorEnvironment
-        Of plants that share a building. Each of its members is a beginning, with its plant and people, that episodes
-        are drawn from; it gives the precision, and is reset.
+        Each of its members is a beginning, with its building, weather and people, that episodes are drawn from; it
+        gives the precision, and is reset.
     seed : int
         Of the beginnings.
 
@@ -80,8 +80,6 @@ class FunctionalEnvironment:
     ------
     MissingExtraError
         Without JAX.
-    ModelError
-        When members have buildings that differ.
 
     Notes
     -----
@@ -99,7 +97,7 @@ class FunctionalEnvironment:
     def __init__(self, worlds: VectorEnvironment, seed: int = 0) -> None:
         batch, layout = worlds.batch, worlds.single.layout
         given, done = batch.traced.inputs, batch.traced.results
-        carried = [getattr(given, name) for name in _CARRIED]
+        carried = [*(getattr(given, name) for name in _CARRIED), *given.matrices]
         self._advance = FunctionalProgram(
             batch.traced.tape, [given.row, given.actions, given.noise, *carried],
             [done.measured, done.reward, *carried], batch.dtype,
@@ -108,9 +106,9 @@ class FunctionalEnvironment:
         seen = tape.value(len(worlds.single.plants[0].columns))
         self._scaled = FunctionalProgram(tape, [seen], [tape.keep(layout.measured(seen), layout.own)], batch.dtype)
         worlds.reset(seed=seed)
-        members, begun = worlds.num_envs, batch.inputs()
+        members = worlds.num_envs
         rows, beside, *values = (
-            _last_first(v, members) for v in (batch.rows(), worlds.rows(), *(begun[name] for name in _CARRIED))
+            _last_first(v, members) for v in (batch.rows(), worlds.rows(), *(batch.of(v) for v in carried))
         )
         tables = Tables(rows, beside, worlds.ends[batch.plant_of], batch.measured.T.copy(), tuple(values))
         self.tables = jax.tree.map(jnp.asarray, tables)

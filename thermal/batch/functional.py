@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from thermal.batch.carried import Reduce, Take, copied, where
+from thermal.batch.carried import Reduce, Take, copied, product, where
 from thermal.batch.program import needed
 from thermal.batch.trace import Tape, Traced, View
 from thermal.errors import MissingExtraError, ModelError
@@ -30,7 +30,7 @@ class FunctionalProgram:
     Parameters
     ----------
     tape : Tape
-        What is to be done: operations on elements, sums, products with constants and choices of rows.
+        What is to be done: operations on elements, sums, products and choices of rows.
     inputs, outputs : sequence of Traced
         Kept values, whole: what the function takes and what it gives, in order. A value may be both.
     dtype : type
@@ -111,12 +111,13 @@ def _function(noted: Any) -> Callable[..., Any]:
         return lambda values: values[rows]
     if noted is np.matmul:  # a GPU's products are of few digits unless it is told otherwise
         return lambda first, second: jnp.matmul(first, second, precision=jax.lax.Precision.HIGHEST)
+    if noted is product:
+        return lambda matrix, vector: (matrix * vector).sum(axis=1)
     if isinstance(noted, Reduce) and noted.function in (np.add, np.maximum):
         return lambda values: (jnp.sum if noted.function is np.add else jnp.max)(values, axis=noted.axis)
     places = (jnp, jax.scipy.special) if isinstance(noted, np.ufunc) else ()
     found = next((getattr(place, noted.__name__) for place in places if hasattr(place, noted.__name__)), None)
     if found is None:
         name = getattr(noted, "__qualname__", repr(noted))
-        raise ModelError("batch", "operations of NumPy on elements, sums and products with constants", name,
-                         "buildings that differ are stepped by the vector environment alone")  # fmt: skip
+        raise ModelError("batch", "operations of NumPy on elements, sums and products", name)
     return found  # type: ignore[no-any-return]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -17,21 +18,29 @@ from mpc.environment.office import Office, office_environment, office_plants
 from mpc.environment.vector import VectorEnvironment
 from mpc.loop.make import PlantSettings
 from mpc.loop.noise import SensorNoise
-from thermal.errors import ModelError
 
 SMALL: dict[str, Any] = {"office": Office(zones=4, floor_area=200.0), "days": 1}
 COARSE = PlantSettings(dx=1.0, order=30, noise=SensorNoise(), control_steps=3)
 
 
-@pytest.mark.parametrize("options", [{"starts": ("2023-01-09", "2023-07-10"), "histograms": True},
-                                     {"plant": COARSE, "reward": "paper"}])  # fmt: skip
-def test_it_is_the_vector_environment(options: dict[str, Any]) -> None:
+def those_that_differ() -> ControlEnvironment:
+    """Offices with other windows, and modes of other numbers."""
+    each = [PlantSettings(dx=1.0, order=n, parameters={"window_u_value": u}) for u, n in ((2.0, 30), (3.0, 25))]
+    plants = [p for s in each for p in office_plants(SMALL["office"], s, ("2023-01-09",), 1)]
+    return ControlEnvironment(plants)
+
+
+@pytest.mark.parametrize("make", [
+    lambda: office_environment(**SMALL, starts=("2023-01-09", "2023-07-10"), histograms=True),
+    lambda: office_environment(**SMALL, plant=COARSE, reward="paper"), those_that_differ,
+])  # fmt: skip
+def test_it_is_the_vector_environment(make: Callable[[], ControlEnvironment]) -> None:
     with jax.enable_x64(True):
-        worlds = VectorEnvironment(office_environment(**SMALL, **options), 4, dtype=np.float64)
+        worlds = VectorEnvironment(make(), 4, dtype=np.float64)
         world = FunctionalEnvironment(worlds, seed=3)
         state, seen = world._begin(jax.numpy.arange(4))
         (own, infos), rng = worlds.reset(seed=3), np.random.default_rng(0)
-        assert "starts" not in options or len({*infos["plant"]}) == 2
+        assert len({*infos["plant"]}) == len(worlds.single.plants)
         np.testing.assert_allclose(seen, own, atol=2e-6)
         step, each = jax.jit(world.advance), worlds.each
         for k in range(30):
@@ -41,7 +50,7 @@ def test_it_is_the_vector_environment(options: dict[str, Any]) -> None:
             own, rewards, *_ = worlds.step(actions)
             np.testing.assert_allclose(reward, rewards, rtol=1e-9, atol=1e-12)
             np.testing.assert_allclose(world._observe(state, measured), own, atol=2e-6)
-        np.testing.assert_allclose(state.values[0], worlds.batch.inputs()["reading"], atol=1e-9)
+        np.testing.assert_allclose(state.values[0], worlds.batch.of(worlds.batch.traced.inputs.reading), atol=1e-9)
 
 
 def test_episodes_end_and_begin_anew_in_the_same_step() -> None:
@@ -57,10 +66,3 @@ def test_episodes_end_and_begin_anew_in_the_same_step() -> None:
     assert (np.asarray(state.step) == 1).all() and (state.beginning != before).any()
     first, _ = world._begin(state.beginning)
     assert np.abs(state.values[0] - first.values[0]).max() < 1.0
-
-
-def test_buildings_that_differ_are_refused_by_name() -> None:
-    each = [PlantSettings(dx=1.0, order=30, parameters={"window_u_value": u}) for u in (2.0, 3.0)]
-    plants = [p for s in each for p in office_plants(SMALL["office"], s, ("2023-01-09",), 1)]
-    with pytest.raises(ModelError, match="buildings that differ"):
-        FunctionalEnvironment(VectorEnvironment(ControlEnvironment(plants), 2))
