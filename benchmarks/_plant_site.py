@@ -87,7 +87,7 @@ class PlantSite(BacnetDevice):
         address = self.start()
         objects = {name: f"analog-input,{k}" for k, name in enumerate(self.columns, 1)}
         objects |= {actuator.name: self.at(k) for k, actuator in enumerate(self.actuators, 1)}
-        points = {name: {"at": at, "unit": _unit(name)} for name, at in objects.items()}
+        points = {name: {"at": at} | ({"unit": "degC"} if _warm(name) else {}) for name, at in objects.items()}
         for actuator in self.actuators:
             # what the plant's own control has is not known: no rate can be kept from there
             written = {"range": [actuator.lowest, actuator.highest], "rate": 0.0, "release": "relinquish"}
@@ -136,11 +136,12 @@ class PlantSite(BacnetDevice):
             return True
         self.late = max(self.late, passed - self.step)
         self.seen = await asyncio.to_thread(self.plant.step, self.actions())
-        self.time += self.step
         await self._tell()
-        if self.time >= self._next and not self.plant.finished:
+        ends = self.time + self.step
+        if ends >= self._next and not self.plant.finished:
             self._tables.write(await asyncio.to_thread(self.plant.forecast))
             self._next += self.file.control_step
+        self.time = ends  # whoever sees it finds all that belongs to it
         return not self.plant.finished
 
     async def _tell(self) -> None:
@@ -167,14 +168,14 @@ def _step_of(file: PlantFile) -> float:
     return file.control_step / math.ceil(file.control_step / LONGEST_STEP - 1e-9)
 
 
-def _unit(name: str) -> str | None:
-    """Tell the unit on the device; None is the library's."""
+def _warm(name: str) -> bool:
+    """Tell whether a point is a temperature, which the device has in degC."""
     kind = POINT_TYPES.get(name.rpartition("/")[2])
-    return "degC" if kind is not None and kind.quantity == "temperature" else None
+    return kind is not None and kind.quantity == "temperature"
 
 
 def _line(name: str) -> Conversion:
-    return conversion(name.rpartition("/")[2], name, _unit(name))
+    return conversion(name.rpartition("/")[2], name, "degC" if _warm(name) else None)
 
 
 def _taken(actuator: Actuator, value: float) -> float:

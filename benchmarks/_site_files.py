@@ -68,7 +68,8 @@ def described_site(
     start : Timestamp
         When it begins, local.
     """
-    told = file.model_dump(mode="json", exclude_defaults=True)
+    # its unions are told apart by functions that know what a file holds, not what was read: they would warn
+    told = file.model_dump(mode="json", exclude_defaults=True, warnings=False)
     for name, zone in told["zones"].items():
         zone["temperature"] = points[f"{name}/zone_air_temperature_sensor"]
         zone["comfort"] = {edge: f"{name}/comfort_{edge}_temperature" for edge in ("lower", "upper")}
@@ -81,7 +82,7 @@ def described_site(
     told["plant"], told["series"] = {"kind": "site"}, [WEATHER, OTHER]
     told["weather"] = {point: point for point in WEATHER_POINTS if point in forecast}
     told["prices"] = told.get("prices", {}) | _of_table("price", forecast)
-    if "electricity_carbon_intensity" in forecast:
+    if "electricity_carbon_intensity" in forecast and forecast["electricity_carbon_intensity"].any():
         told["emissions"] = told.get("emissions", {}) | _of_table("carbon_intensity", forecast)
     told["forecast"] = {"hours": file.forecast.hours}
     told.pop("energy", None)  # sums of signals that the device does not have
