@@ -17,7 +17,7 @@ from mpc.adapters.described.load import load_plant
 from mpc.adapters.described.programs import EnergyPlusProgram
 from mpc.adapters.described.read import read_description
 from mpc.adapters.described.schema import PlantFile
-from mpc.errors import LiveError
+from mpc.errors import LiveError, PlantError
 from mpc.live.clock import SimulatedClock, set_clock
 from mpc.loop.actuators import Actuator
 from mpc.loop.conversion import Conversion, conversion
@@ -26,6 +26,9 @@ from thermal.case.points import POINT_TYPES, ZONE_TEMPERATURE
 #: Longest step of a plant behind its device [s]: what is written to it acts within as long.
 LONGEST_STEP = 300.0
 
+#: End of a range that a device of single precision has no number for [unit of the actuator].
+LARGEST = 1e30
+
 
 class PlantSite(BacnetDevice):
     """A plant and its device.
@@ -33,7 +36,8 @@ class PlantSite(BacnetDevice):
     Each measurement is an analog input, temperatures in degC, all else in the library's units. Each actuator is an
     analog value, or a binary one where it is on-off. What is commanded there when a step ends has held over the step;
     an actuator that nobody commands is left to the plant's own control. Such an actuator shows what the plant measures
-    under its name, where it does, and the lower end of its range otherwise.
+    under its name, where it does, and the lower end of its range otherwise. An input that the plant has no number for
+    stays as it was: the device's stack takes none.
 
     Parameters
     ----------
@@ -62,6 +66,10 @@ class PlantSite(BacnetDevice):
         }  # fmt: skip
         self.plant = load_plant(path, at=at, changes=changes)
         try:
+            for actuator in self.plant.actuators:
+                known = -LARGEST < actuator.lowest and actuator.highest < LARGEST
+                where, expected = f"actuators.{actuator.name}.range", "a lowest and a highest value"
+                PlantError.unless(known, where, expected, "none in the description and the program")
             self.seen = self.plant.reset()
             self._tables = ForecastTables(folder, self.step)
             folder.mkdir(parents=True, exist_ok=True)

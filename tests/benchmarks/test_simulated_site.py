@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import yaml
 
-from mpc.errors import LiveError
+from mpc.errors import LiveError, PlantError
 from mpc.live.clock import set_clock
 from mpc.live.links.make import make_links
 from mpc.live.outlook import Outlook
@@ -131,8 +131,17 @@ def test_a_model_of_energyplus_is_a_site(
     check_plan(device, site)
     setpoint = "house/zone_air_heating_temperature_setpoint"
     assert operated(device, site, setpoint, 296.15) == pytest.approx((294.45, 296.15, 294.45))
+    path = tmp_path / "house" / "plant.yaml"
     with pytest.raises(LiveError, match="a folder without an earlier run"):
-        make_site(tmp_path / "house" / "plant.yaml")
+        make_site(path)
+    plant_site = script("_plant_site").PlantSite
+    with pytest.raises(LiveError, match="rate: expected more than 1"):
+        plant_site(path, tmp_path / "other", 1.0)
+    told = yaml.safe_load(path.read_text())
+    del told["actuators"]["floor/pump"]["range"]
+    path.write_text(yaml.safe_dump(told))
+    with pytest.raises(PlantError, match=r"actuators.floor/pump.range: expected a lowest"):
+        plant_site(path, tmp_path / "other", 60.0)
 
 
 def test_what_a_device_is_told_becomes_a_value_of_the_actuator(script: Callable[[str], ModuleType]) -> None:
