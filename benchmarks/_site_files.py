@@ -76,8 +76,8 @@ def described_site(
         people = f"{name}/occupancy_count_sensor"
         zone["people"] = people if people in forecast else 0.0
     for name, entry in told.get("actuators", {}).items():
-        entry.pop("unit", None), entry.pop("release", None)
-        entry["signal"] = points[name]
+        told["actuators"][name] = {k: v for k, v in entry.items() if k not in ("unit", "release")}
+        told["actuators"][name]["signal"] = points[name]
     told["measurements"] = {name: points[name] for name in file.measurements}
     told["plant"], told["series"] = {"kind": "site"}, [WEATHER, OTHER]
     told["weather"] = {point: point for point in WEATHER_POINTS if point in forecast}
