@@ -116,6 +116,7 @@ def test_a_test_case_of_a_boptest_server_is_a_site(make_site: Make, tmp_path: Pa
         assert device.step == 300.0 and set(site.writable) == set(plant["actuators"])
         check_plan(device, site)
         assert operated(device, site, water, 345.0) == pytest.approx((333.15, 345.0, 333.15))
+        check_plan(device, site)  # a control step later, on tables that have gone on
         device.stop()  # frees the test while the server is there
 
 
@@ -130,6 +131,7 @@ def test_a_model_of_energyplus_is_a_site(
     check_plan(device, site)
     setpoint = "house/zone_air_heating_temperature_setpoint"
     assert operated(device, site, setpoint, 296.15) == pytest.approx((294.45, 296.15, 294.45))
+    check_plan(device, site)
     path = tmp_path / "house" / "plant.yaml"
     with pytest.raises(LiveError, match="a folder without an earlier run"):
         make_site(path)
