@@ -38,7 +38,8 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from _bacnet_site import LOOK, OWN, Write
+from _bacnet_device import LOOK, Write
+from _bacnet_site import OWN
 from _drill_faults import FAULTS, Fault
 from _drill_process import DrillController
 from _drill_stack import HIGH, LOW, RATE, RATES, STEP, TICK, Stack

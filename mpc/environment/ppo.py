@@ -1,5 +1,6 @@
 """Proximal policy optimisation as one function of JAX: plants, network and optimiser on the same device."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -35,7 +36,7 @@ class PpoSettings:
     log_std_init : float
         Logarithm of the first standard deviation of actions [-].
     reward_scale : float
-        What rewards are multiplied by.
+        What rewards are multiplied by [-].
     units : tuple of int
         Of the hidden layers.
 
@@ -115,20 +116,21 @@ class Ppo:
         (weights, *_), rewards = jax.lax.scan(self._round, start, jax.random.split(run, rounds))
         return weights, rewards
 
-    def policy(self, weights: Any, **about: Any) -> ActorNetwork:
+    def policy(self, weights: Any, about: Mapping[str, Any] | None = None) -> ActorNetwork:
         """Give what was learned as a policy in NumPy.
 
         Parameters
         ----------
         weights : dict
             Of `learn`.
-        **about
+        about : mapping, optional
             How it was trained, as plain values.
         """
         layers = weights["actor"]
         return ActorNetwork(
-            tuple(np.asarray(w).T for w, _ in layers), tuple(np.asarray(b) for _, b in layers), "tanh", False, about
-        )
+            tuple(np.asarray(w).T for w, _ in layers), tuple(np.asarray(b) for _, b in layers), "tanh", False,
+            about or {},
+        )  # fmt: skip
 
     def _optimiser(self) -> Any:
         s = self.settings

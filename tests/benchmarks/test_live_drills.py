@@ -23,7 +23,7 @@ def request(object_type: int, number: int, value: float | None, priority: int) -
 
 
 def test_writes_are_read_off_the_wire(script: Callable[[str], ModuleType]) -> None:
-    decode = script("_bacnet_site").decode_write
+    decode = script("_bacnet_device").decode_write
     assert decode(request(2, 3, 21.5, 13)) == (7, (2, 3), 85, 13, 21.5)
     assert decode(request(2, 1, None, 8)) == (7, (2, 1), 85, 8, None)
     assert decode(b"") is None and decode(bytes([0x81, 0x0A, 0, 17, 1, 4, 0, 5, 1, 12, 0x0C, 0, 0, 0, 2, 0x19, 85])) is None
@@ -33,13 +33,13 @@ def test_writes_are_read_off_the_wire(script: Callable[[str], ModuleType]) -> No
 def drills(script: Callable[[str], ModuleType]) -> ModuleType:
     for name, extra in (("bacpypes3", "live"), ("psycopg", "live"), ("rusty_bacnet", "test")):
         pytest.importorskip(name, reason=f"needs the extra [{extra}]")
-    for name in ("_bacnet_site", "_drill_process", "_postgres", "_drill_stack", "_drill_faults", "_table"):
+    for name in ("_bacnet_device", "_bacnet_site", "_drill_process", "_postgres", "_drill_stack", "_drill_faults", "_table"):
         script(name)
     return script("live_drills")
 
 
 def test_what_counts_as_a_bad_write(drills: ModuleType, script: Callable[[str], ModuleType]) -> None:
-    write = script("_bacnet_site").Write
+    write = script("_bacnet_device").Write
 
     def told(*writes: Any) -> list[str]:
         return [text for _, text in drills.bad_writes([write(*one) for one in writes])]

@@ -86,6 +86,7 @@ def test_a_guard_of_the_command_gives_back_and_listens(
 ) -> None:
     pytest.importorskip("rusty_bacnet", reason="needs a BACnet device of another stack: pip install rusty-bacnet")
     pytest.importorskip("bacpypes3", reason="needs the extra [live]")
+    script("_bacnet_device")
     device = script("_bacnet_site").SimulatedSite(100.0)
     path = make(tmp_path, device.start(), "advise")
     device.operate(1, 22.0, 13)  # what a guard left that was killed

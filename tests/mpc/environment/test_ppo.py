@@ -25,7 +25,7 @@ def test_it_learns() -> None:
     weights, rewards = jax.jit(learner.learn, static_argnums=1)(jax.random.key(0), 60)
     assert rewards.shape == (60,) and np.isfinite(rewards).all()
     earned = []
-    for act in (lambda seen: np.zeros(2, dtype=np.float32), learner.policy(weights, rounds=60).act):
+    for act in (lambda seen: np.zeros(2, dtype=np.float32), learner.policy(weights, {"rounds": 60}).act):
         seen, _ = single.reset(seed=5)
         total, ended = 0.0, False
         while not ended:

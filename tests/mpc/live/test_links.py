@@ -27,6 +27,7 @@ POINTS = {"zone": ("analog-input,2", CELSIUS), "set": ("analog-value,1", CELSIUS
 def device(script: Any) -> Iterator[Any]:
     pytest.importorskip("rusty_bacnet", reason="needs a BACnet device of another stack: pip install rusty-bacnet")
     pytest.importorskip("bacpypes3", reason="needs the extra [live]")
+    script("_bacnet_device")
     site = script("_bacnet_site").SimulatedSite(100.0)
     site.address = site.start()
     yield site
