@@ -42,7 +42,7 @@ def first_alarms(threshold: float, seeds: range, n_day: int) -> list[float]:
     found = []
     for seed in seeds:
         days = made(seed, n_day)
-        filtered, what = DayFilter(days, 0.25 * np.eye(N_ERROR)), sought(days.columns)
+        filtered, what = DayFilter(days, 0.25 * np.eye(N_ERROR)), sought(days)
         state, dispersion = filtered.start(), Dispersion(n_day, what.which.size)
         watch, first = Watch(what, state.mean.size, dispersion), np.inf
         for day in range(n_day):
@@ -92,9 +92,9 @@ def test_noise_is_found_where_no_day_shows_all_errors() -> None:
 def test_information_of_a_new_change_is_that_of_least_squares() -> None:
     """On the day of a change score and information are jᵀ V⁻¹ ν and jᵀ V⁻¹ j."""
     days = made(3, 5)
-    filtered, what = DayFilter(days, 0.25 * np.eye(N_ERROR)), sought(days.columns)
+    filtered, what = DayFilter(days, 0.25 * np.eye(N_ERROR)), sought(days)
     state = filtered.start()
-    watch = Watch(what, state.mean.size, Dispersion(5, 2))
+    watch = Watch(what, state.mean.size, Dispersion(5, what.which.size))
     for day in range(4):
         state, innovation = filtered.step(state, day)
         assert innovation is not None
@@ -204,7 +204,7 @@ def test_names_are_told_apart_by_one_noise() -> None:
     """Two changes that do the same to the errors are as likely, whatever the days before were like."""
     days = made(4, 12, 2.0, start=6)
     days.slopes[:, :, 1] = days.slopes[:, :, 0]
-    filtered, what = DayFilter(days, 0.25 * np.eye(N_ERROR)), sought(days.columns)
+    filtered, what = DayFilter(days, 0.25 * np.eye(N_ERROR)), sought(days)
     state = filtered.start()
     watch = Watch(what, state.mean.size, Uneven(len(days), what.which.size))
     for day in range(len(days)):
