@@ -70,7 +70,7 @@ class Found:
     deviation: float
 
     def shown(self, days: Days, day: int) -> FloatArray:
-        """Derivatives of a day's errors by the size of the change, shape (n_error,) [K].
+        """Return the derivatives of a day's errors by the size of the change, shape (n_error,) [K].
 
         Parameters
         ----------

@@ -38,10 +38,10 @@ _UNKNOWN = 0.01
 #: rooms are furnished, sensors wrapped and ducts come apart far less often than valves leak and windows stay open.
 RARELY, _RARE = ("wrong_station", "hidden_mass", "sensor_lag", "duct_loss"), 0.1
 
-#: Effects that may come over days, and the days that these are tried with beside at once [d]: sensors and meters drift,
-#: seats wear, terminals foul; heat that names no cause may do what they do, or its course alone would tell a sensor.
-#: All slow courses of an effect have as much prior weight as its sudden one.
-SLOWLY, OVER = ("sensor_bias", "flow_gain", "valve_leak", "capacity_limit", *NO_CAUSE), (3, 6, 12)
+#: Effects that may come over days, and the days that these are tried with beside at once [d]: sensors drift; heat that
+#: names no cause may come as slowly, or the course alone would tell a sensor. All slow courses of an effect have as
+#: much prior weight as its sudden one.
+SLOWLY, OVER = ("sensor_bias", *NO_CAUSE), (3, 6, 12)
 
 #: Prior weight of the end of each change that was found, beside all that may begin [-].
 _ENDS = 0.5
