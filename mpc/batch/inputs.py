@@ -139,6 +139,14 @@ class DrivingRows:
         if self._own is not None:
             np.copyto(out[self._common :], self._own[self._numbers, steps].T)
 
+    def table(self) -> Array:
+        """Give all rows of all members, shape (n_steps, width, member or 1); the last row of shorter ones repeats."""
+        members = len(self._numbers)
+        found = np.zeros((int(self._lengths.max()), self.width, members if self.each else 1), self._dtype)
+        for step, row in enumerate(found):
+            self.fill(np.full(members, step), row)
+        return found
+
 
 class DrawnNoise:
     """Noise of many members, drawn for a block of steps at a time: each has the numbers that it has alone.

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mpc.batch.alike import checked_plants, different_models
 from mpc.batch.building import Array, BatchedBuilding
 from mpc.batch.inputs import DrawnNoise, DrivingRows, people_rows, plant_rows
 from mpc.batch.step import Score, TracedStep
@@ -17,6 +18,7 @@ from mpc.loop.reduced import ReducedBuilding
 from mpc.loop.simulated import SimulatedPlant
 from thermal._types import FloatArray, IntArray
 from thermal.batch.program import Program
+from thermal.batch.trace import Traced
 from thermal.units import REFERENCE_TEMPERATURE
 
 
@@ -82,12 +84,12 @@ class BatchedPlant:
         models, self._model_of = different_models([p.model for p in self.plants])  # type: ignore[misc]
         own = ("gains", "people", "outside") if self._random_people else ()
         self._rows = DrivingRows([plant_rows(p) for p in self.plants], members, own, dtype)
-        self._building = BatchedBuilding(models, members, dtype)
-        self._traced = TracedStep(
+        self._building = BatchedBuilding(models)
+        #: The step that was traced.
+        self.traced = TracedStep(
             first, self._rows.parts, self._rows.width, self._rows.each, self.actions, self._building, score,
-            len(models) > 1,
         )  # fmt: skip
-        self._program = Program(self._traced.tape, members, dtype, compiled)
+        self._program = Program(self.traced.tape, members, dtype, compiled)
         noise = first.sensors.noise
         self._noise = None if noise is None else DrawnNoise(noise, members, dtype)
         #: Which plant and seed each member has, and the number of the step that comes next, shape (member,).
@@ -129,10 +131,37 @@ class BatchedPlant:
         return self._of("measured")
 
     def _of(self, name: str) -> Array:
-        return self._program.of(getattr(self._traced.results, name))
+        return self._program.of(getattr(self.traced.results, name))
 
     def _set(self, name: str) -> Array:
-        return self._program.of(getattr(self._traced.inputs, name))
+        return self._program.of(getattr(self.traced.inputs, name))
+
+    def of(self, value: Traced) -> Array:
+        """Give a value of `traced` as it is, shape (..., member or 1); the next step writes to it.
+
+        Parameters
+        ----------
+        value : Traced
+            An input or a result.
+        """
+        return self._program.of(value)
+
+    def rows(self) -> Array:
+        """Give what drives members from their reset on, shape (n_steps, width, member or 1), as `TracedStep.part`."""
+        return self._rows.table()
+
+    def noise(self, steps: IntArray) -> Array:
+        """Give the random numbers of a step of each member, shape (n_noise, member) [-]; none without noise.
+
+        Parameters
+        ----------
+        steps : ndarray of int, shape (member,)
+            Numbers of the steps, in the order of the run.
+        """
+        found = np.zeros_like(self._set("noise"))
+        if self._noise is not None:
+            self._noise.fill(steps, found)
+        return found
 
     def reset(self, seeds: ArrayLike, plants: ArrayLike | None = None, members: ArrayLike | None = None) -> Array:
         """Start members anew, after the warm-up of their plants.
@@ -213,7 +242,8 @@ class BatchedPlant:
 
     def _set_out(self, number: int, who: IntArray, warm: LoopState) -> None:
         plant, (state, _) = self.plants[number], warm.building
-        self._building.start(who, np.full(len(who), self._model_of[number]), [state] * (self._model_of[number] + 1))
+        matrices = [self._program.of(value) for value in self.traced.inputs.matrices]
+        self._building.start(who, int(self._model_of[number]), state, self._set("modes"), matrices)
         columns = {
             "reading": warm.reading - REFERENCE_TEMPERATURE, "missed": warm.missed,
             "cycling": np.array(warm.cycling, dtype=float), "states": np.array(warm.hvac.values),
@@ -323,78 +353,3 @@ def record_of(history: tuple[Array, Array] | None, member: int, steps: int, seco
     kept = zones[: steps + 1, :, member].astype(float) + REFERENCE_TEMPERATURE
     electricity, gas = powers[:steps, :, member].astype(float).T
     return PlantRecord(seconds, kept, electricity, gas)
-
-
-def different_models(models: Sequence[ReducedBuilding]) -> tuple[list[ReducedBuilding], IntArray]:
-    """Find which reduced buildings differ.
-
-    Parameters
-    ----------
-    models : sequence of ReducedBuilding
-        One a plant.
-
-    Returns
-    -------
-    tuple
-        Those that differ, and which of them each is.
-    """
-    found, place = list[ReducedBuilding](), list[int]()
-    for model in models:
-        mine = model.step_matrices()
-        same = [k for k, other in enumerate(found) if other is model or
-                all(np.array_equal(a, b) for a, b in zip(mine, other.step_matrices(), strict=True))]  # fmt: skip
-        place.append(same[0] if same else len(found))
-        found += [] if same else [model]
-    return found, np.array(place, dtype=np.intp)
-
-
-def checked_plants(plants: Any) -> tuple[SimulatedPlant, ...]:
-    """Refuse plants that cannot be stepped together.
-
-    Parameters
-    ----------
-    plants : SimulatedPlant or sequence of SimulatedPlant
-        The plants, or what is none.
-
-    Raises
-    ------
-    PlantError
-        Which plant does not fit, and why.
-    """
-    every = (plants,) if isinstance(plants, SimulatedPlant) else tuple(plants)
-    PlantError.unless(bool(every), "batch", "a plant or more", "none")
-    first = every[0]
-    for k, plant in enumerate(every):
-        where, kind = f"batch: plant {k}", type(getattr(plant, "model", plant)).__name__
-        PlantError.unless(isinstance(getattr(plant, "model", None), ReducedBuilding), where,
-                          "one on a reduced building", kind, "take kind='reduced'")  # fmt: skip
-        for what in ("columns", "actuators", "control_steps", "zone_names"):
-            same = getattr(plant, what) == getattr(first, what)
-            PlantError.unless(same, where, f"the same {what.replace('_', ' ')} as plant 0", "others")
-        same = same_system(plant.system, first.system) and plant.scenario.grid.step == first.scenario.grid.step
-        PlantError.unless(same, where, "the HVAC system and step of plant 0", "others")
-        signals = [[s.name for s in p.model.network.signals] for p in (plant, first)]
-        PlantError.unless(signals[0] == signals[1], where, "the signals of effects of plant 0", "others")
-        noise = [None if p.sensors.noise is None else p.sensors.noise.noise for p in (plant, first)]
-        PlantError.unless(noise[0] == noise[1], where, "the noise of plant 0", "another")
-    return every
-
-
-def same_system(one: Any, other: Any) -> bool:
-    """Tell whether two components, systems or parameters are the same in all that they are made of.
-
-    Parameters
-    ----------
-    one, other : object
-        Any.
-    """
-    if one is other:
-        return True
-    if isinstance(one, np.ndarray):
-        return isinstance(other, np.ndarray) and np.array_equal(one, other)
-    names = getattr(one, "__dataclass_fields__", None)
-    if names is not None:
-        return type(one) is type(other) and all(same_system(getattr(one, k), getattr(other, k)) for k in names)
-    if isinstance(one, dict):
-        return isinstance(other, dict) and list(one) == list(other) and all(same_system(one[k], other[k]) for k in one)
-    return bool(one == other)

@@ -2,10 +2,10 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
+from mpc.batch.building import BatchedBuilding
 from mpc.errors import PlantError
 from mpc.kpi.rewards import StepValues
 from mpc.loop.actuators import COOLING_SETPOINT, HEATING_SETPOINT
@@ -42,6 +42,10 @@ class StepInputs:
         1 for those that run since a zone has drifted [-].
     states : Traced, shape (n_state,)
         Of the system [unit of the state].
+    modes : Traced, shape (order,)
+        Of the building [-].
+    matrices : tuple of Traced
+        Of `StepMatrices`, where members have buildings of their own.
     """
 
     row: Traced
@@ -53,6 +57,8 @@ class StepInputs:
     response: Traced
     cycling: Traced
     states: Traced
+    modes: Traced
+    matrices: tuple[Traced, ...]
 
 
 @dataclass(eq=False)
@@ -93,12 +99,10 @@ class TracedStep:
         Whether members have rows of their own.
     actions : sequence of str
         Actuators that are set, by ``ENTITY/POINT``.
-    building : object
-        With ``begin`` and ``finish`` for all members.
+    building : BatchedBuilding
+        Of all members.
     score : callable, optional
         What a step is worth; nothing by default.
-    several : bool
-        Whether members have buildings of their own.
     tape : Tape
         Where it is noted.
     """
@@ -108,9 +112,8 @@ class TracedStep:
     row_width: int
     each_row: bool
     actions: Sequence[str]
-    building: Any
+    building: BatchedBuilding
     score: Score | None = None
-    several: bool = False
     tape: Tape = field(default_factory=Tape)
 
     def __post_init__(self) -> None:
@@ -121,8 +124,9 @@ class TracedStep:
         self.inputs = StepInputs(
             tape.value(self.row_width, each=self.each_row), tape.value(len(self.actions)),
             tape.value(0 if noise is None else noise.width), tape.value(n), tape.value(n),
-            tape.value(n, each=self.several), tape.value(n, each=self.several),
+            tape.value(n, each=not self.building.shared), tape.value(n, each=not self.building.shared),
             tape.value(len(system.air_handlers)), tape.value(len(system.states)),
+            tape.value(self.building.order), self.building.matrices(tape),
         )  # fmt: skip
         self.results = self._trace(TracedOperations(tape))
 
@@ -143,7 +147,7 @@ class TracedStep:
         asked = {name: given.actions[k] for k, name in enumerate(self.actions)}
         heating, cooling = self._setpoints(asked)
         runs, cycling = self._runs(ops, heating, cooling)
-        free = tape.call(self.building.begin, [part("gains"), part("outside")], n)
+        free, finish = self.building.traced(given.matrices, given.modes, part("gains"), part("outside"))
         actions, supply, reach = schedule.switched(ops, asked, runs, part("ventilation")[0])
         local = LocalControl(system, given.response)  # type: ignore[arg-type]
         air = np.stack([s - REFERENCE_TEMPERATURE for s in supply]) if supply else np.zeros(0)
@@ -160,7 +164,7 @@ class TracedStep:
         before = [given.states[k] for k in range(len(system.states))]
         done = advance(ops, system, before, calls, conditions, actions, plant.scenario.grid.step * 1.0)
         heat = system.at_zones(ops, done.results)
-        reached = tape.call(self.building.finish, [heat, part("gains"), part("outside"), free], n)
+        reached = finish(heat)
         mean = 0.5 * (given.reading + reached) + REFERENCE_TEMPERATURE
         step = PlantStep(0, conditions, actions, done, mean, reached)  # type: ignore[arg-type]
         measured = plant.sensors.exact(ops, step, part("weather"), part("people"))

@@ -12,6 +12,7 @@ from mpc.errors import MpcError, PlantActionError
 from mpc.loop.actuators import Actuator
 from thermal._types import FloatArray
 from thermal.case.points import split_column
+from thermal.components.operations import Value
 
 Observation = NDArray[np.float32]
 Values = NDArray[Any]
@@ -101,6 +102,11 @@ class ObservationLayout:
     def __len__(self) -> int:
         return len(self.features)
 
+    @property
+    def own(self) -> int:
+        """Entries of measurements and histograms, which come first."""
+        return self._ends[1]
+
     def observe(self, values: FloatArray, ahead: FloatArray | None, now: FloatArray) -> Observation:
         """Observe.
 
@@ -119,19 +125,33 @@ class ObservationLayout:
             Within `LARGEST` of 0 [-].
         """
         seen = np.empty(len(self.features), dtype=np.float32)
-        measured, counted, forecast = self._ends
-        seen[:measured] = values[self._kept] * self._factor + self._offset
-        begin = measured
-        for at, edges in self._histograms:
-            bins = np.searchsorted(edges, values[at], side="right")
-            seen[begin : begin + len(edges) + 1] = np.bincount(bins, minlength=len(edges) + 1) / at.size
-            begin += len(edges) + 1
+        _, counted, forecast = self._ends
+        seen[:counted] = self.measured(values)
         if ahead is not None:
             seen[counted:forecast] = ahead
         seen[forecast:] = now
         if np.isnan(seen.sum()):
             seen[np.isnan(seen)] = 0.0
         return np.minimum(np.maximum(seen, -LARGEST, out=seen), LARGEST, out=seen)
+
+    def measured(self, values: Value) -> Value:
+        """Scale measurements, and count those that histograms stand for: what an observation begins with.
+
+        Parameters
+        ----------
+        values : Value, shape (n_column,)
+            Measurements, or such that are traced [library's units].
+
+        Returns
+        -------
+        Value, shape (n_measured,)
+            Neither cut at `LARGEST` nor without NaN [-].
+        """
+        parts = [values[self._kept] * self._factor + self._offset]
+        for at, edges in self._histograms:
+            beyond = [np.where(values[at] >= edge, 1.0, 0.0).sum() for edge in edges]
+            parts.append((np.stack([float(at.size), *beyond]) - np.stack([*beyond, 0.0])) / at.size)
+        return np.concatenate(parts)
 
     def observe_many(self, values: Values, ahead: Values | None, now: Values) -> Observation:
         """Observe many plants at once.

@@ -10,8 +10,9 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from mpc.batch.alike import checked_plants
 from mpc.batch.inputs import DrivingRows
-from mpc.batch.plant import BatchedPlant, checked_plants, record_of
+from mpc.batch.plant import BatchedPlant, record_of
 from mpc.environment.environment import ControlEnvironment, Course, draw_episode
 from mpc.environment.features import LARGEST, clock
 from mpc.environment.layout import Observation
@@ -115,7 +116,8 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Observation, NDArray[np.float
         self.single_action_space, self.single_observation_space = single.action_space, single.observation_space
         self.action_space = batch_space(single.action_space, num_envs)
         self.observation_space = batch_space(single.observation_space, num_envs)
-        self._reward_of_mean = bool(given.of_mean)
+        #: Whether a control step counts as the mean of the plant's steps.
+        self.reward_of_mean = bool(given.of_mean)
         #: The plants, stepped together.
         self.batch = BatchedPlant(
             checked_plants(single.plants), num_envs, actions=single.actions.names, dtype=dtype,
@@ -129,7 +131,8 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Observation, NDArray[np.float
         ends = [course.last - course.last % each for course in courses]
         if single.episode_steps is not None:
             ends = [min(end, single.episode_steps * each) for end in ends]
-        self._each, self._ends = each, np.array(ends)
+        #: Steps of the plant in a control step, and those after which an episode of each plant is over.
+        self.each, self.ends = each, np.array(ends)
         self._same_step = autoreset_mode is AutoresetMode.SAME_STEP
         self._rngs = [seeding.np_random(None)[0] for _ in range(num_envs)]
         self._ended = np.zeros(num_envs, dtype=bool)
@@ -143,6 +146,10 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Observation, NDArray[np.float
     def action_names(self) -> tuple[str, ...]:
         """Names of the entries of an action."""
         return self.single.action_names
+
+    def rows(self) -> NDArray[Any]:
+        """Give forecasts and clock as they are observed, shape (n_steps, width, member or 1)."""
+        return self._seen.table()
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: Infos | None = None
@@ -202,7 +209,7 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Observation, NDArray[np.float
             rewards[starting] = 0.0
             if measured is not self.batch.measured:
                 measured[:, starting] = self.batch.measured[:, starting]
-        truncated = self.batch.now >= self._ends[self.batch.plant_of]
+        truncated = self.batch.now >= self.ends[self.batch.plant_of]
         self._ended = truncated
         seen = self._observe(measured)
         terminated, over = np.zeros(self.num_envs, dtype=bool), np.flatnonzero(truncated)
@@ -235,13 +242,13 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Observation, NDArray[np.float
         """Step the plants through a control step; give rewards and mean measurements."""
         setpoints, batch = self.single.actions.setpoints_of_many(actions), self.batch
         measured, rewards = batch.step(setpoints, self._ended), batch.rewards.astype(float)
-        if self._each > 1:
+        if self.each > 1:
             measured = measured.copy()
-            for _ in range(self._each - 1):
+            for _ in range(self.each - 1):
                 measured += batch.step(setpoints, self._ended)
                 rewards += batch.rewards
-            measured /= self._each
-            rewards /= self._each if self._reward_of_mean else 1.0
+            measured /= self.each
+            rewards /= self.each if self.reward_of_mean else 1.0
         return rewards, measured
 
     def _begin(self, who: NDArray[np.intp], options: Infos | None = None) -> Infos:

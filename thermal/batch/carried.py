@@ -36,6 +36,21 @@ def where(mask: Any, first: Any, second: Any, out: FloatArray) -> None:
     np.copyto(out, first, where=mask)
 
 
+def product(matrix: Any, vector: Any, out: FloatArray) -> None:
+    """Multiply a matrix of each member by a vector.
+
+    Parameters
+    ----------
+    matrix : ndarray, shape (m, n, member)
+        Any [any].
+    vector : ndarray, shape (n, member or 1)
+        Any [any].
+    out : ndarray, shape (m, member)
+        Filled [any].
+    """
+    np.einsum("ijk,jk->ik", matrix, vector, out=out)
+
+
 class Reduce(NamedTuple):
     """A reduction over an axis, such as a sum.
 

@@ -30,6 +30,9 @@ _OPERATIONS: dict[Any, Callable[..., Any]] = {
     copied: lambda x: x, where: ca.if_else,
 }  # fmt: skip
 
+#: Entries of a matrix whose product is unrolled; a larger one is faster by NumPy.
+_LARGEST_PRODUCT = 1000
+
 
 def interprets(note: Instruction) -> bool:
     """Tell whether an instruction is arithmetic that can be unrolled.
@@ -40,7 +43,9 @@ def interprets(note: Instruction) -> bool:
         Any.
     """
     function = note.function
-    known = function in _OPERATIONS or function is np.matmul or isinstance(function, Take)
+    if function is np.matmul:
+        return bool(note.inputs[0].size <= _LARGEST_PRODUCT)
+    known = function in _OPERATIONS or isinstance(function, Take)
     return known or (isinstance(function, Reduce) and function.function in _OPERATIONS)
 
 

@@ -46,7 +46,7 @@ class Program:
         self.members, self.dtype = members, np.dtype(dtype)
         alone = members == 1 and self.dtype == np.float64 and not compiled
         self._numbers, within = compiled or alone, set[int]()
-        notes = _needed(tape)
+        notes = needed(tape)
         if compiled:
             fits = partial(compiles, dtype=self.dtype)
             notes = taken_apart(notes, members, fits)
@@ -172,7 +172,7 @@ def _views(note: Instruction) -> list[View]:
     return [*(v for v in note.inputs if isinstance(v, View)), note.output]
 
 
-def _needed(tape: Tape) -> list[Instruction]:
+def needed(tape: Tape) -> list[Instruction]:
     """Instructions that something kept follows from."""
     wanted, found = set(tape.kept), list[Instruction]()
     for note in reversed(tape.notes):

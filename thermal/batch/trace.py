@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
-from thermal.batch.carried import Reduce, Take, copied, where
+from thermal.batch.carried import Reduce, Take, copied, product, where
 from thermal.components.operations import Value
 from thermal.errors import ModelError
 
@@ -339,10 +339,12 @@ class Traced(NDArrayOperatorsMixin):
         return self.tape.note(Reduce(ufunc, axis), [self], shape)
 
     def _product(self, first: Any, second: Any) -> Traced:
-        """Product with a constant matrix or vector on either side."""
+        """Product with a constant matrix or vector on either side, or of a traced matrix or vector with a vector."""
         if isinstance(first, Traced) and isinstance(second, Traced):
-            product: Traced = (first * second).sum()
-            return product
+            if len(first.shape) == 2:
+                return self.tape.note(product, [first, second], first.shape[:1])
+            total: Traced = (first * second).sum()
+            return total
         if isinstance(second, Traced):
             matrix, vector = np.asarray(first, dtype=float), second
         else:
