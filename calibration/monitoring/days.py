@@ -207,7 +207,7 @@ def coming(over: int, onset: FloatArray) -> tuple[FloatArray, FloatArray]:
     over : int
         Days over which it comes; 0 is at once [d].
     onset : ndarray, shape (n_onset, ...)
-        What is added on the first days of a change that comes at once.
+        What is added on the first days of a change that comes at once [K].
 
     Returns
     -------
