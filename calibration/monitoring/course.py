@@ -55,6 +55,8 @@ class Event:
         Of all effects that have one per cent and more [-].
     since : int
         Day of the change.
+    over : int
+        Days over which it came; 0 is at once [d].
     alarm : int
         Day on which it was noticed.
     named : int
@@ -76,6 +78,7 @@ class Event:
     probability: float
     probabilities: dict[str, float]
     since: int
+    over: int
     alarm: int
     named: int
     log_evidence: float
@@ -180,7 +183,7 @@ class _Walk:
 
     def __init__(self, days: Days, reference: int, threshold: float) -> None:
         self.days, self.threshold = days, threshold
-        self.what: Sought = sought(days.columns)
+        self.what: Sought = sought(days)
         self.filter = DayFilter(days, noise_of(days, reference))
         self.dispersion = Dispersion(len(days), self.what.which.size)
         self.day, self.watched_from = 0, reference
@@ -233,7 +236,7 @@ class _Walk:
         """Close what is over at once; name what is new once there are days enough."""
         over = int(np.argmax(alarm.ends)) if alarm.ends.size else -1
         if over >= 0 and alarm.ends[over] > _CLOSES:
-            self._close(self.lasting[over], alarm.start, day, noticed)
+            self._close(self.lasting[over], int(alarm.starts[alarm.share.size + over]), day, noticed)
             return
         if day - noticed < NAMING_DAYS and day + 1 < len(self.days):
             return
@@ -245,14 +248,14 @@ class _Walk:
         for k in self.lasting:
             same = self.events[k].effect == event.effect and self.events[k].zones == event.zones
             if same and event.size * self.events[k].size < 0.0 and 2.0 * abs(event.size) > abs(self.events[k].size):
-                self._close(k, alarm.start, day, noticed)
+                self._close(k, event.since, day, noticed)
                 return
         self.events.append(event)
-        self.places.append(number)
         column = int(self.what.which[number])
-        deviation = self.days.columns[column].deviation
-        self.filter = self.filter.with_changes([*self.filter.changes, Found(column, alarm.start, None, deviation)])
-        self._go_back(alarm.start, day)
+        self.places.append(int(np.argmax((self.what.which == column) & (self.what.over == 0))))  # mended at once
+        change = Found(column, event.since, None, event.over, self.days.columns[column].deviation)
+        self.filter = self.filter.with_changes([*self.filter.changes, change])
+        self._go_back(event.since, day)
 
     def _close(self, which: int, end: int, day: int, noticed: int) -> None:
         self.events[which] = replace(self.events[which], end=end, end_alarm=noticed)
@@ -280,12 +283,12 @@ class _Walk:
         ranked = dict(sorted(shares.items(), key=lambda item: -item[1]))
         best = next(iter(ranked))
         number = int(np.argmax(np.where(np.array(names) == best, alarm.share, -1.0)))
-        column = columns[number]
+        column, since = columns[number], int(alarm.starts[number])
         return number, Event(
             effect=best, zones=column.zones, parameter=column.name, unit=column.unit,
-            size=watch.size(alarm.start, number), deviation=float("nan"), probability=ranked[best],
-            probabilities={name: share for name, share in ranked.items() if share >= 0.01}, since=alarm.start,
-            alarm=noticed, named=day, log_evidence=alarm.log_evidence,
+            size=watch.size(since, number), deviation=float("nan"), probability=ranked[best],
+            probabilities={name: share for name, share in ranked.items() if share >= 0.01}, since=since,
+            over=int(self.what.over[number]), alarm=noticed, named=day, log_evidence=alarm.log_evidence,
         )  # fmt: skip
 
     def course(self, told: BoolArray) -> Course:

@@ -196,6 +196,39 @@ def days_of_case(
     )  # fmt: skip
 
 
+def coming(over: int, onset: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Share of a change that has come by each of its first days, and what its first days add to its derivatives.
+
+    A change that comes over days comes in equal parts at the midnights of these, and in half a part at the first and
+    the last. Each part has the first days of a change at once after it.
+
+    Parameters
+    ----------
+    over : int
+        Days over which it comes; 0 is at once [d].
+    onset : ndarray, shape (n_onset, ...)
+        What is added on the first days of a change that comes at once [K].
+
+    Returns
+    -------
+    tuple of ndarray
+        Shares, shape (n_onset + over,) [-], all 1 later; what is added, shape (n_onset + over, ...), nothing later.
+
+    Examples
+    --------
+    >>> coming(2, np.array([1.0]))
+    (array([0.25, 0.75, 1.  ]), array([0.25, 0.5 , 0.25]))
+    """
+    part = np.full(over + 1, 1.0 / max(1, over))
+    if over:
+        part[[0, -1]] *= 0.5
+    added = np.zeros((len(onset) + over, *onset.shape[1:]))
+    for day, share in enumerate(part):
+        added[day : day + len(onset)] += share * onset
+    shares = np.append(np.cumsum(part), np.ones(max(0, len(added) - len(part))))
+    return shares[: len(added)], added
+
+
 class _Replay:
     """Runs of the model from midnight to midnight, half way and at their end."""
 

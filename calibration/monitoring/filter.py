@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from calibration.monitoring.days import Days
+from calibration.monitoring.days import Days, coming
 from thermal._types import BoolArray, FloatArray, IntArray
 
 #: Growth of the usual error in a day over the deviation of a day's errors [-]: over a quarter of a year the level moves
@@ -57,6 +57,8 @@ class Found:
         First day.
     end : int or None
         First day on which it is over; None while it lasts.
+    over : int
+        Days over which it came; 0 is at once [d].
     deviation : float
         Standard deviation of its size before the data [estimation scale].
     """
@@ -64,7 +66,27 @@ class Found:
     column: int
     start: int
     end: int | None
+    over: int
     deviation: float
+
+    def shown(self, days: Days, day: int) -> FloatArray:
+        """Return the derivatives of a day's errors by the size of the change, shape (n_error,) [K].
+
+        Parameters
+        ----------
+        days : Days
+            The telemetry.
+        day : int
+            Which.
+        """
+        moved = np.zeros(days.errors.shape[1])
+        for sign, first, over in ((1.0, self.start, self.over), (-1.0, self.end, 0)):
+            if first is not None and first <= day:
+                shares, added = coming(over, days.onset[..., self.column])
+                begun = day - first < len(shares)
+                share, onset = (shares[day - first], added[day - first]) if begun else (1.0, 0.0)
+                moved += sign * (share * days.slopes[day, :, self.column] + onset)
+        return moved
 
 
 @dataclass(frozen=True)
@@ -210,8 +232,7 @@ class DayFilter:
         if seen.any():
             slopes, one = days.slopes[day][seen], np.eye(seen.size)[seen]
             off = float(days.days_off[day])
-            lasting = [c.start <= day and (c.end is None or day < c.end) for c in self.changes]
-            found = [slopes[:, [c.column]] * on for c, on in zip(self.changes, lasting, strict=True)]
+            found = [c.shown(days, day)[seen, None] for c in self.changes]
             # e(θ) = e + J dθ: errors of the model as it is are what dθ, the level and the changes leave of zero
             observe = np.hstack([-slopes, one, off * one, *(-f for f in found)])
             scale = self.scale(day)

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.special import log_ndtr, logsumexp
 
-from calibration.monitoring.days import Column, Days
+from calibration.monitoring.days import NO_CAUSE, Column, Days, coming
 from calibration.monitoring.filter import Innovation
 from thermal._types import FloatArray, IntArray
 
@@ -37,6 +37,11 @@ _UNKNOWN = 0.01
 #: Effects that rarely begin from one day to the next, and their prior weight beside others [-]: stations are moved,
 #: rooms are furnished, sensors wrapped and ducts come apart far less often than valves leak and windows stay open.
 RARELY, _RARE = ("wrong_station", "hidden_mass", "sensor_lag", "duct_loss"), 0.1
+
+#: Effects that may come over days, and the days that these are tried with beside at once [d]: sensors drift; heat that
+#: names no cause may come as slowly, or the course alone would tell a sensor. All slow courses of an effect have as
+#: much prior weight as its sudden one.
+SLOWLY, OVER = ("sensor_bias", *NO_CAUSE), (3, 6, 12)
 
 #: Prior weight of the end of each change that was found, beside all that may begin [-].
 _ENDS = 0.5
@@ -56,17 +61,26 @@ class Sought:
     columns : tuple of Column
         All columns of the days.
     which : ndarray of int, shape (n_sought,)
-        Those that may change.
+        Those that may change, each once for every course that it may take.
+    over : ndarray of int, shape (n_sought,)
+        Days over which each comes; 0 is at once [d].
     weight : ndarray, shape (n_sought,)
         Probability of each before the data [-], in sum 1.
+    shares : ndarray, shape (n_age, n_sought)
+        Share of each that has come by its first days [-].
+    onset : ndarray, shape (n_age, n_error, n_sought)
+        What is added to the derivatives on these days [K].
     """
 
     columns: tuple[Column, ...]
     which: IntArray
+    over: IntArray
     weight: FloatArray
+    shares: FloatArray
+    onset: FloatArray
 
     def shown(self, days: Days, day: int, innovation: Innovation) -> FloatArray:
-        """Show what a unit of each change does to a day's errors, (n_seen, n_sought) [K].
+        """Show what a unit of each change does to a day's errors once all of it has come, (n_seen, n_sought) [K].
 
         Parameters
         ----------
@@ -80,24 +94,33 @@ class Sought:
         return np.asarray(-days.slopes[day][innovation.seen][:, self.which])
 
 
-def sought(columns: Sequence[Column]) -> Sought:
-    """Share the probability before the data among effects, and in each among its zones and strengths.
+def sought(days: Days) -> Sought:
+    """Share the probability before the data among effects, and in each among its zones, strengths and courses.
 
     Parameters
     ----------
-    columns : sequence of Column
-        Of the days.
+    days : Days
+        With their columns.
     """
-    which = np.array([k for k, c in enumerate(columns) if c.may_change], dtype=np.int64)
+    columns = days.columns
+    courses = [(k, over) for k, c in enumerate(columns) if c.may_change
+               for over in ((0, *OVER) if c.effect in SLOWLY else (0,))]  # fmt: skip
+    which, over = np.array(courses, dtype=np.int64).reshape(-1, 2).T
     effects = np.array([columns[k].effect for k in which])
     unknown = np.array([columns[k].is_unknown for k in which], dtype=bool)
     weight = np.zeros(len(which))
     for known, whole in ((~unknown, 1.0 - _UNKNOWN), (unknown, _UNKNOWN)):
         for effect in np.unique(effects[known]):
             of = effects == effect
-            weight[of] = whole * (_RARE if effect in RARELY else 1.0) / np.count_nonzero(of)
+            often = np.where(over[of] > 0, 1.0 / len(OVER), 1.0)
+            weight[of] = whole * (_RARE if effect in RARELY else 1.0) * often / often.sum()
         weight[known] *= whole / max(weight[known].sum(), 1e-300)
-    return Sought(tuple(columns), which, weight / weight.sum())
+    shares = np.ones((len(days.onset) + max(OVER), which.size))
+    onset = np.zeros((len(shares), days.onset.shape[1], which.size))
+    for number, (column, length) in enumerate(courses):
+        begun, added = coming(length, days.onset[..., column])
+        shares[: len(begun), number], onset[: len(begun), :, number] = begun, added
+    return Sought(columns, which, over, weight / weight.sum(), shares, onset)
 
 
 class Dispersion:
@@ -158,8 +181,8 @@ class Alarm:
     ----------
     log_evidence : float
         Logarithm of the e-detector [-].
-    start : int
-        Likeliest day since when.
+    starts : ndarray of int, shape (n_sought + n_end,)
+        Likeliest day since when, of each change and, after these, of each end.
     share : ndarray, shape (n_sought,)
         Probability of each change, given that there is one [-].
     ends : ndarray, shape (n_end,)
@@ -167,7 +190,7 @@ class Alarm:
     """
 
     log_evidence: float
-    start: int
+    starts: IntArray
     share: FloatArray
     ends: FloatArray
 
@@ -225,8 +248,8 @@ class Watch:
         self.dispersion.put(day, own, innovation)
         shown = own[:, None, :] - (innovation.observe @ self._moved.reshape(n, -1)).reshape(-1, t, k)
         for number, age in enumerate(day - self.starts):
-            if age < len(days.onset):
-                shown[:, number] -= days.onset[age][innovation.seen][:, self.what.which]
+            if age < len(self.what.shares):
+                shown[:, number] += own * (self.what.shares[age] - 1.0) - self.what.onset[age][innovation.seen]
         flat = shown.reshape(len(own), -1)
         self._moved += (innovation.gain @ flat).reshape(n, t, k)
         white = solve_triangular(innovation.root, flat, lower=True)
@@ -304,5 +327,5 @@ class Watch:
         beside = logsumexp(self._ratios(np.full_like(which, likeliest), pair), axis=0)
         named = self._ratios(which, pair) - beside + weight
         probability = np.exp(logsumexp(named, axis=0) - logsumexp(named))
-        start = int(self.starts[np.argmax(logsumexp(named, axis=1))])
-        return Alarm(float(logsumexp(told)), start, probability[:k], probability[k:])
+        starts = self.starts[np.argmax(named, axis=0)]
+        return Alarm(float(logsumexp(told)), starts, probability[:k], probability[k:])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -9,7 +11,7 @@ import pytest
 from calibration.errors import NotEnoughDataError
 from calibration.monitoring.course import NAMING_DAYS, follow
 from calibration.monitoring.days import ONSET, Column, Days
-from calibration.monitoring.filter import DayFilter, noise_of
+from calibration.monitoring.filter import DayFilter, Found, noise_of
 from calibration.monitoring.watch import Dispersion, Watch, sought
 from thermal._types import FloatArray
 
@@ -21,8 +23,8 @@ def column(name: str, effect: str | None, changes: bool, zones: tuple[str, ...] 
     return Column(name, "1", effect, zones, 1.0, 0.3, 0.0, 0.0, changes, False)
 
 
-def made(seed: int, n_day: int, shift: float = 0.0, start: int = 0, end: int = 10**6) -> Days:
-    """Make white days about what is expected, with a change of the first of two strengths."""
+def made(seed: int, n_day: int, shift: float = 0.0, start: int = 0, end: int = 10**6, over: int = 0) -> Days:
+    """Make white days about what is expected, with a change of the first of two strengths, at once or over days."""
     rng = np.random.default_rng(seed)
     slopes = np.zeros((n_day, N_ERROR, 3))
     slopes[:, :3, 0] = slopes[:, 3:, 1] = 1.0
@@ -30,7 +32,8 @@ def made(seed: int, n_day: int, shift: float = 0.0, start: int = 0, end: int = 1
     columns = (column("valve_leak@A", "valve_leak", True, ("A",)), column("flow_gain@B", "flow_gain", True, ("B",)),
                column("window_u_value", None, False))  # fmt: skip
     errors = 0.5 * rng.standard_normal((n_day, N_ERROR))
-    lasts = (np.arange(n_day) >= start) & (np.arange(n_day) < end)
+    share = np.clip((np.arange(n_day) - start + 0.5) / max(over, 0.5), 0.0, 1.0)
+    lasts = np.where(np.arange(n_day) < end, share, 0.0)
     # errors are simulated minus measured: what the model lacks takes the sign of its derivative the other way
     errors -= shift * lasts[:, None] * slopes[:, :, 0]
     dates = pd.date_range("2023-01-02", periods=n_day, freq="D", tz="UTC")
@@ -42,7 +45,7 @@ def first_alarms(threshold: float, seeds: range, n_day: int) -> list[float]:
     found = []
     for seed in seeds:
         days = made(seed, n_day)
-        filtered, what = DayFilter(days, 0.25 * np.eye(N_ERROR)), sought(days.columns)
+        filtered, what = DayFilter(days, 0.25 * np.eye(N_ERROR)), sought(days)
         state, dispersion = filtered.start(), Dispersion(n_day, what.which.size)
         watch, first = Watch(what, state.mean.size, dispersion), np.inf
         for day in range(n_day):
@@ -92,15 +95,15 @@ def test_noise_is_found_where_no_day_shows_all_errors() -> None:
 def test_information_of_a_new_change_is_that_of_least_squares() -> None:
     """On the day of a change score and information are jᵀ V⁻¹ ν and jᵀ V⁻¹ j."""
     days = made(3, 5)
-    filtered, what = DayFilter(days, 0.25 * np.eye(N_ERROR)), sought(days.columns)
+    filtered, what = DayFilter(days, 0.25 * np.eye(N_ERROR)), sought(days)
     state = filtered.start()
-    watch = Watch(what, state.mean.size, Dispersion(5, 2))
+    watch = Watch(what, state.mean.size, Dispersion(5, what.which.size))
     for day in range(4):
         state, innovation = filtered.step(state, day)
         assert innovation is not None
         watch.take(day, days, innovation)
     assert innovation is not None
-    own = -days.slopes[3][:, :2]
+    own = what.shown(days, 3, innovation) * what.shares[0]
     expected = np.linalg.solve(innovation.root @ innovation.root.T, own)
     assert watch._information[-1] == pytest.approx(np.sum(own * expected, axis=0))
     assert watch._score[-1] == pytest.approx(expected.T @ innovation.left)
@@ -130,6 +133,30 @@ def test_a_change_is_dated_named_sized_and_closed() -> None:
     assert event.size == pytest.approx(1.5, abs=4.0 * event.deviation)
     assert event.end is not None
     assert abs(event.end - 110) <= 2
+
+
+def test_a_change_that_comes_over_days_is_dated_and_sized_by_its_course() -> None:
+    drift, jump = (made(7, 100, 2.5, start=70, over=over) for over in (12, 0))
+    sensor = (column("sensor_bias@A", "sensor_bias", True, ("A",)), *drift.columns[1:])
+    event, at_once = (follow(replace(days, columns=sensor), REFERENCE).events[0] for days in (drift, jump))
+    assert (event.effect, event.zones) == ("sensor_bias", ("A",))
+    assert event.over > 0
+    assert abs(event.since - 70) <= 4
+    assert event.size == pytest.approx(2.5, abs=4.0 * event.deviation)
+    assert at_once.over == 0
+
+
+def test_a_slow_change_is_the_sum_of_its_parts() -> None:
+    """Over two days, a quarter of it has come by the middle of the first; each part has its own first days."""
+    days = made(6, 30)
+    days.onset[:, :, 0] = np.arange(ONSET, 0, -1)[:, None]
+    parts = [Found(0, 10 + day, None, 0, 1.0) for day in range(3)]
+    slow = Found(0, 10, None, 2, 1.0)
+    for day in (9, 10, 11, 12, 14, 17, 25):
+        by_part = [part.shown(days, day) for part in parts]
+        assert slow.shown(days, day) == pytest.approx(0.25 * by_part[0] + 0.5 * by_part[1] + 0.25 * by_part[2])
+    assert np.all(slow.shown(days, 25) == days.slopes[25, :, 0])
+    assert np.all(Found(0, 10, 20, 0, 1.0).shown(days, 29) == 0.0)
 
 
 def test_quiet_days_are_quiet() -> None:
@@ -204,7 +231,7 @@ def test_names_are_told_apart_by_one_noise() -> None:
     """Two changes that do the same to the errors are as likely, whatever the days before were like."""
     days = made(4, 12, 2.0, start=6)
     days.slopes[:, :, 1] = days.slopes[:, :, 0]
-    filtered, what = DayFilter(days, 0.25 * np.eye(N_ERROR)), sought(days.columns)
+    filtered, what = DayFilter(days, 0.25 * np.eye(N_ERROR)), sought(days)
     state = filtered.start()
     watch = Watch(what, state.mean.size, Uneven(len(days), what.which.size))
     for day in range(len(days)):
