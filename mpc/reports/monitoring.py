@@ -120,5 +120,6 @@ def _what(event: Event) -> str:
 
 
 def _when(found: Monitoring, event: Event) -> str:
-    since = f"since {found.date(event.since):%Y-%m-%d}"
+    slowly = f", in the course of {counted(event.over, 'day')}" if event.over else ""
+    since = f"since {found.date(event.since):%Y-%m-%d}{slowly}"
     return since if event.end is None else f"{since}, over on {found.date(event.end):%Y-%m-%d}"
