@@ -146,7 +146,7 @@ class FunctionalEnvironment:
         tuple
             State, and observations, shape (member, n_feature) [-].
         """
-        return self._begin(jax.random.randint(key, (members,), 0, len(self.tables.ends)))
+        return self.begin(jax.random.randint(key, (members,), 0, len(self.tables.ends)))
 
     def step(self, state: EpisodeState, actions: Any, key: Any) -> tuple[EpisodeState, Any, Any, Any, Any]:
         """Hold an action a member for a control step.
@@ -170,7 +170,7 @@ class FunctionalEnvironment:
         dtype = self._lowest.dtype
         noise = [jax.random.normal(k, (self._noise, len(state.step)), dtype) for k in keys]
         state, measured, reward = self.advance(state, actions, noise)
-        final, ended = self._observe(state, measured), state.step >= self.tables.ends[state.beginning]
+        final, ended = self.observe(state, measured), state.step >= self.tables.ends[state.beginning]
         fresh, first = self.reset(again, len(state.step))
         state = jax.tree.map(lambda new, old: jnp.where(ended, new, old), fresh, state)
         return state, jnp.where(ended[:, None], first, final), reward, ended, final
@@ -202,12 +202,33 @@ class FunctionalEnvironment:
         state = EpisodeState(state.beginning, state.step + self._each, tuple(values))
         return state, total / self._each, reward / (self._each if self._of_mean else 1.0)
 
-    def _begin(self, beginning: Any) -> tuple[EpisodeState, Any]:
+    def begin(self, beginning: Any) -> tuple[EpisodeState, Any]:
+        """Begin chosen episodes.
+
+        Parameters
+        ----------
+        beginning : array of int, shape (member,)
+            Which beginning each member has.
+
+        Returns
+        -------
+        tuple
+            As `reset`.
+        """
         values = tuple(jnp.moveaxis(v[beginning], 0, -1) for v in self.tables.values)
         state = EpisodeState(beginning, jnp.zeros_like(beginning), values)
-        return state, self._observe(state, self.tables.measured[beginning].T)
+        return state, self.observe(state, self.tables.measured[beginning].T)
 
-    def _observe(self, state: EpisodeState, measured: Any) -> Any:
+    def observe(self, state: EpisodeState, measured: Any) -> Any:
+        """Give observations, shape (member, n_feature) [-].
+
+        Parameters
+        ----------
+        state : EpisodeState
+            Where episodes are.
+        measured : array, shape (n_column, member)
+            As `advance` gives them [library's units].
+        """
         (own,) = self._scaled(measured)
         beside = self._row(self.tables.seen, state.beginning, state.step)
         return jnp.clip(jnp.nan_to_num(jnp.concatenate([own, beside])), -LARGEST, LARGEST).T

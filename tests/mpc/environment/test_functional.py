@@ -38,7 +38,7 @@ def test_it_is_the_vector_environment(make: Callable[[], ControlEnvironment]) ->
     with jax.enable_x64(True):
         worlds = VectorEnvironment(make(), 4, dtype=np.float64)
         world = FunctionalEnvironment(worlds, seed=3)
-        state, seen = world._begin(jax.numpy.arange(4))
+        state, seen = world.begin(jax.numpy.arange(4))
         (own, infos), rng = worlds.reset(seed=3), np.random.default_rng(0)
         assert len({*infos["plant"]}) == len(worlds.single.plants)
         np.testing.assert_allclose(seen, own, atol=2e-6)
@@ -49,7 +49,7 @@ def test_it_is_the_vector_environment(make: Callable[[], ControlEnvironment]) ->
             state, measured, reward = step(state, actions, noise)
             own, rewards, *_ = worlds.step(actions)
             np.testing.assert_allclose(reward, rewards, rtol=1e-9, atol=1e-12)
-            np.testing.assert_allclose(world._observe(state, measured), own, atol=2e-6)
+            np.testing.assert_allclose(world.observe(state, measured), own, atol=2e-6)
         np.testing.assert_allclose(state.values[0], worlds.batch.of(worlds.batch.traced.inputs.reading), atol=1e-9)
 
 
@@ -64,5 +64,5 @@ def test_episodes_end_and_begin_anew_in_the_same_step() -> None:
         assert np.asarray(ended).all() == (k in (2, 5)) and np.isfinite(reward).all()
         assert np.allclose(seen, final) != (k in (2, 5))
     assert (np.asarray(state.step) == 1).all() and (state.beginning != before).any()
-    first, _ = world._begin(state.beginning)
+    first, _ = world.begin(state.beginning)
     assert np.abs(state.values[0] - first.values[0]).max() < 1.0
