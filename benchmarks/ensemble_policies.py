@@ -12,8 +12,8 @@ the same recipe, steps and weeks, on as many plants at once as there are members
 No policy is chosen by what it does: the last one counts. The judge is the stage cost of a week of the office.
 
 Run: ``python benchmarks/ensemble_policies.py --out results/ensemble [--seeds 0 1 2 3 4] [--publish]`` (extra
-``[jax]``), a quarter to half an hour of CPU a policy, ten seconds on a GPU. A policy or a run that is there is not made again.
-Writes ``ensemble_policies.json`` and ``.md``.
+``[jax]``), a quarter to half an hour of CPU a policy, ten seconds on a GPU. A policy or a run that is there is not made
+again. Writes ``ensemble_policies.json`` and ``.md``.
 """
 
 from __future__ import annotations
