@@ -131,10 +131,10 @@ class BatchedPlant:
         return self._of("measured")
 
     def _of(self, name: str) -> Array:
-        return self._program.of(getattr(self.traced.results, name))
+        return self.of(getattr(self.traced.results, name))
 
     def _set(self, name: str) -> Array:
-        return self._program.of(getattr(self.traced.inputs, name))
+        return self.of(getattr(self.traced.inputs, name))
 
     def of(self, value: Traced) -> Array:
         """Give a value of `traced` as it is, shape (..., member or 1); the next step writes to it.
@@ -242,7 +242,7 @@ class BatchedPlant:
 
     def _set_out(self, number: int, who: IntArray, warm: LoopState) -> None:
         plant, (state, _) = self.plants[number], warm.building
-        matrices = [self._program.of(value) for value in self.traced.inputs.matrices]
+        matrices = [self.of(value) for value in self.traced.inputs.matrices]
         self._building.start(who, int(self._model_of[number]), state, self._set("modes"), matrices)
         columns = {
             "reading": warm.reading - REFERENCE_TEMPERATURE, "missed": warm.missed,
