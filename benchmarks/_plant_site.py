@@ -6,6 +6,7 @@ import asyncio
 import math
 import re
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from mpc.errors import LiveError, PlantError
 from mpc.live.clock import SimulatedClock, set_clock
 from mpc.loop.actuators import Actuator
 from mpc.loop.conversion import Conversion, conversion
+from mpc.loop.plant import Plant
 from thermal.case.points import POINT_TYPES, ZONE_TEMPERATURE
 
 #: Longest step of a plant behind its device [s]: what is written to it acts within as long.
@@ -41,42 +43,33 @@ class PlantSite(BacnetDevice):
 
     Parameters
     ----------
-    path : str or Path
-        The ``plant.yaml``, or a name of `ready_plants`.
+    file : PlantFile
+        Describes it; its control step is that of the forecasts that are written.
+    plant : Plant
+        Steps in parts of the control step; ended with the site where it has `close`.
     folder : Path
         For the site's files; a new one, as the plant begins anew with each start.
     rate : float
         How many times faster than real time the site's clock runs, which begins with the plant's period [-].
-    at : str, optional
-        As of `load_plant`.
+    forecast_step : float
+        Of the plant's forecasts [s].
     """
 
-    def __init__(self, path: str | Path, folder: Path, rate: float, at: str | None = None) -> None:
+    def __init__(self, file: PlantFile, plant: Plant, folder: Path, rate: float, forecast_step: float) -> None:
         live = folder / "live"
         expected, advice = "a folder without an earlier run, as the plant begins anew", "name another folder"
         LiveError.unless(not live.exists(), f"folder {folder}", expected, "logs in live/", advice)
         LiveError.unless(rate > 1.0, "rate", "more than 1, as the site's clock is not the machine's", f"{rate:g}")
-        self.file, self.folder, self.rate = _with_zones(read_description(path, at=at)), folder, rate
-        self.step = _step_of(self.file)
-        outlook = self.file.forecast
-        hours = outlook.hours + AHEAD * self.file.control_step / 3600.0
-        changes = {
-            "control_step": self.step, "forecast": outlook.model_dump() | {"hours": hours},
-            "measurements": {name: signal.model_dump() for name, signal in self.file.measurements.items()},
-        }  # fmt: skip
-        self.plant = load_plant(path, at=at, changes=changes)
-        try:
-            for actuator in self.plant.actuators:
-                known = -LARGEST < actuator.lowest and actuator.highest < LARGEST
-                where, expected = f"actuators.{actuator.name}.range", "a lowest and a highest value"
-                PlantError.unless(known, where, expected, "none in the description and the program")
-            self.seen = self.plant.reset()
-            self._tables = ForecastTables(folder, self.step)
-            folder.mkdir(parents=True, exist_ok=True)
-            self._forecast = self._tables.write(self.plant.forecast())
-        except BaseException:
-            self.plant.close()
-            raise
+        self.file, self.folder, self.rate = _with_zones(file), folder, rate
+        self.plant, self.step = plant, plant.control_step
+        for actuator in plant.actuators:
+            known = -LARGEST < actuator.lowest and actuator.highest < LARGEST
+            where, expected = f"actuators.{actuator.name}.range", "a lowest and a highest value"
+            PlantError.unless(known, where, expected, "none in the description and the program")
+        self.seen = plant.reset()
+        self._tables = ForecastTables(folder, forecast_step)
+        folder.mkdir(parents=True, exist_ok=True)
+        self._forecast = self._tables.write(plant.forecast())
         self.time = self.first = float(self.seen.seconds)
         self.late = 0.0
         self._clock: SimulatedClock | None = None
@@ -90,8 +83,22 @@ class PlantSite(BacnetDevice):
         names = [a.name for a in self.actuators]
         super().__init__(self.file.name, self.columns, [*map(Command, names, shown, switches)])
 
-    def begin(self, database: str, port: int = 8080, model: Path | None = None) -> Path:
-        """Start the device, write the site's files, and let its clock run; return the site's file."""
+    def begin(
+        self, database: str, port: int = 8080, model: Path | None = None, more: Mapping[str, Any] | None = None
+    ) -> Path:
+        """Start the device, write the site's files, and let its clock run; return the site's file.
+
+        Parameters
+        ----------
+        database : str
+            Address of the historian.
+        port : int
+            Of the page.
+        model : Path, optional
+            Folder of ``buildingmpc identify``, for ``mpc``; the rule by default.
+        more : mapping of str to object, optional
+            Other keys of the site's file.
+        """
         address = self.start()
         objects = {name: f"analog-input,{k}" for k, name in enumerate(self.columns, 1)}
         objects |= {actuator.name: self.at(k) for k, actuator in enumerate(self.actuators, 1)}
@@ -104,15 +111,42 @@ class PlantSite(BacnetDevice):
         plant = described_site(self.file, objects, self._forecast, start)
         # a database may have samples of an earlier run of this plant, which would lie ahead of the clock
         schema = re.sub("[^a-z0-9_]", "_", f"site_{self.file.name.lower()[:40]}_{time.time():.0f}")
-        more: dict[str, Any] = {} if model is None else {"controller": "mpc", "model": str(model.resolve())}
+        controlled = {} if model is None else {"controller": "mpc", "model": str(model.resolve())}
         site = write_site(
             self.folder, plant, points, address, clock_rate=self.rate, database={"address": database, "schema": schema},
-            page={"port": port}, guard={"clock_jump": max(5.0, self.rate)}, **more,
+            page={"port": port}, guard={"clock_jump": max(5.0, self.rate)}, **controlled, **(more or {}),
         )  # fmt: skip
         (self.folder / "live").mkdir(mode=0o700)
         set_clock(self.folder / "live" / "clock.json", self.time)
         self._clock = SimulatedClock(self.folder / "live" / "clock.json", self.rate)
         return site
+
+    @classmethod
+    def described(cls, path: str | Path, folder: Path, rate: float, at: str | None = None) -> PlantSite:
+        """Make the site of a described plant.
+
+        Parameters
+        ----------
+        path : str or Path
+            The ``plant.yaml``, or a name of `ready_plants`.
+        folder, rate
+            As of the class.
+        at : str, optional
+            As of `load_plant`.
+        """
+        file = _with_zones(read_description(path, at=at))
+        step = _step_of(file)
+        hours = file.forecast.hours + AHEAD * file.control_step / 3600.0
+        changes = {
+            "control_step": step, "forecast": file.forecast.model_dump() | {"hours": hours},
+            "measurements": {name: signal.model_dump() for name, signal in file.measurements.items()},
+        }  # fmt: skip
+        plant = load_plant(path, at=at, changes=changes)
+        try:
+            return cls(file, plant, folder, rate, step)
+        except BaseException:
+            plant.close()
+            raise
 
     @property
     def hours(self) -> float:
@@ -122,7 +156,7 @@ class PlantSite(BacnetDevice):
     def stop(self) -> None:
         """End the device and the plant."""
         super().stop()
-        self.plant.close()
+        getattr(self.plant, "close", lambda: None)()
 
     def actions(self) -> dict[str, float]:
         """Give what is commanded now, by actuator [library's unit]; the rest is left to the plant's own control."""

@@ -12,6 +12,7 @@ import yaml
 
 from mpc.adapters.described.schema import Period, PlantFile
 from mpc.scenario.forecast import Forecast
+from mpc.scenario.gains import InternalGains
 from mpc.scenario.weather import WEATHER_POINTS
 
 #: Tables of what lies on straight lines between its values, and of what holds until the next one.
@@ -75,6 +76,7 @@ def described_site(
         zone["comfort"] = {edge: f"{name}/comfort_{edge}_temperature" for edge in ("lower", "upper")}
         people = f"{name}/occupancy_count_sensor"
         zone["people"] = people if people in forecast else 0.0
+        zone["gains"] = f"{name}/gains" if f"{name}/gains" in forecast else 0.0
     for name, entry in told.get("actuators", {}).items():
         told["actuators"][name] = {k: v for k, v in entry.items() if k not in ("unit", "release")}
         told["actuators"][name]["signal"] = points[name]
@@ -113,6 +115,7 @@ class ForecastTables:
     def write(self, forecast: Forecast) -> pd.DataFrame:
         """Write the latest that is known of each step, and the last hours; return it by the begins of the steps."""
         fresh = forecast.to_frame().dropna(axis="columns", how="all")
+        fresh = fresh.join(_gains(fresh))
         fresh.index = pd.DatetimeIndex(fresh.index).tz_convert("UTC") - self.step
         known = fresh.combine_first(self._known) if len(self._known) else fresh
         self._known = known = known[known.index >= fresh.index[0] - pd.Timedelta(seconds=KEPT)]
@@ -125,6 +128,18 @@ class ForecastTables:
             stamps = [f"{stamp:%Y-%m-%d %H:%M:%S}+00:00" for stamp in pd.DatetimeIndex(table.index)]
             _whole(self.folder / name, table.set_axis(pd.Index(stamps, name="timestamp")).to_csv())
         return known
+
+
+def _gains(forecast: pd.DataFrame) -> pd.DataFrame:
+    """Heat of lights and equipment [W] in the zones that have any beside people's."""
+    found = {}
+    for column in forecast.filter(like="/internal_gain"):
+        zone = column.rpartition("/")[0]
+        people = forecast.get(f"{zone}/occupancy_count_sensor", 0.0)
+        others = (forecast[column] - InternalGains.sensible * people).clip(lower=0.0)
+        if others.max() > 1e-6:
+            found[f"{zone}/gains"] = others
+    return pd.DataFrame(found, index=forecast.index)
 
 
 def _whole(path: Path, text: str) -> None:

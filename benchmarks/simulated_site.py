@@ -90,7 +90,7 @@ def main() -> int:
             building = SimulatedSite(RATE)
             site = hall(options.folder, building.start(), options.database, options.port)
         else:
-            building = PlantSite(options.plant, options.folder, options.rate, options.at)
+            building = PlantSite.described(options.plant, options.folder, options.rate, options.at)
             site = building.begin(options.database, options.port, options.model)
         print(site, flush=True)
         building.wait()

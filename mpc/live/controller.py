@@ -50,7 +50,7 @@ class ControlProcess:
         database = site.file.database
         patience = max(self.clock.real(site.step / 3.0), 0.1)
         self.historian = Historian(database.address, database.schema_name, min(patience, 10.0))
-        self.columns = needed_columns(site)
+        self.columns = needed_columns(site, self.planner.controller)
         self._still: dict[str, tuple[float, float]] = {}
         self.zones = [f"{zone}/{ZONE_TEMPERATURE}" for zone in site.plant.zones]
         self.log = AuditLog(site.folder, "controller", self.clock.wall())

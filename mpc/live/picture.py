@@ -53,7 +53,10 @@ def picture(site: Site, plan: Mapping[str, Any], inputs: Mapping[str, Any]) -> d
         for k, zone in enumerate(zones):
             zones[zone]["expected"] = [round(row[k], 3) for row in ahead["zone"]]
         rule = ahead.get("rule")
-        cost = sum(w * (p or 0.0) for w, p in zip(power, price, strict=False)) * ahead["step"] / _JOULES
+        prices = [of("electricity_price"), of("gas_price")]
+        hours = ahead["step"] / _JOULES
+        rows = [zip(ahead["power"], one, strict=False) for one in prices]
+        cost = sum(row[k] * (p or 0.0) * hours for k, one in enumerate(rows) for row, p in one)
     return {
         "number": plan["number"], "begin": inputs["begin"], "step": site.step, "price": price, "zones": zones,
         "outdoor": of("outside_air_temperature_sensor"), "power": power, "cost": cost, "rule": rule,

@@ -11,12 +11,15 @@ import pandas as pd
 
 from mpc.adapters.described.actuators import described_actuators
 from mpc.baselines.plants import FullSpeed
+from mpc.control.controller.site import Action
 from mpc.control.identified.action import PlannedAction
 from mpc.control.identified.controller import IdentifiedController
 from mpc.errors import LiveError, MpcError
 from mpc.identify.machines import find_machines
 from mpc.identify.model import read_model
+from mpc.live.building import BuildingController, building_controller
 from mpc.live.site import Site
+from mpc.live.site_file import BuildingModel
 from mpc.loop.actuators import Actuator
 from mpc.loop.plant import Controller, Measurements, PointLayout
 from mpc.scenario.forecast import Forecast
@@ -49,9 +52,12 @@ def site_controller(site: Site) -> Controller:
         When its model is of another control step.
     """
     actuators = site_actuators(site)
-    if site.file.controller == "full_speed" or site.model_path is None:
+    entry = site.file.model
+    if site.file.controller == "full_speed" or entry is None:
         return FullSpeed(find_machines(actuators, tuple(site.file.points), tuple(site.plant.zones)))
-    model = read_model(site.model_path)
+    if isinstance(entry, BuildingModel):
+        return building_controller(site, entry, actuators)
+    model = read_model(site.path.parent / entry)
     LiveError.unless(
         abs(model.step - site.step) < 1e-6, f"{site.path.name}: model", f"steps of {site.step:g} s, those of the plant",
         f"{model.step:g} s", "identify the plant anew",
@@ -98,8 +104,10 @@ class Planner:
             action = self.controller.step(measured, forecast_of_dict(inputs["forecast"]))
         except (MpcError, ArithmeticError, ValueError, KeyError, IndexError) as error:
             return no_plan(f"no plan: {type(error).__name__}: {error}")
-        if isinstance(action, PlannedAction) and action.solution is None:
-            return no_plan("no plan: " + ", ".join(action.reasons))
+        outlook = getattr(self.controller, "outlook", None)
+        fallen_back = isinstance(action, Action) and outlook is None
+        if fallen_back or (isinstance(action, PlannedAction) and action.solution is None):
+            return no_plan("no plan: " + ", ".join(getattr(action, "reasons", ())))
         values = {name: float(value) for name, value in action.items()}
         if not all(math.isfinite(value) for value in values.values()):
             return no_plan("no plan: a value is no number")
@@ -109,7 +117,7 @@ class Planner:
             "values": {name: value for name, value in values.items() if name in allowed},
             "other": {name: value for name, value in values.items() if name not in allowed},
             "reasons": list(getattr(action, "reasons", ())),
-            "ahead": _expected(action),
+            "ahead": _expected(outlook or action),
         }
 
 
@@ -124,14 +132,14 @@ def no_plan(why: str) -> dict[str, Any]:
     return {"status": " ".join(why.split())[:200], "values": {}, "other": {}, "reasons": [], "ahead": None}
 
 
-def _expected(action: Any) -> dict[str, Any] | None:
+def _expected(planned: Any) -> dict[str, Any] | None:
     """Temperatures and powers that a plan expects, and what it and the rule cost by the model, for the page."""
-    zone, power = getattr(action, "zone", None), getattr(action, "power", None)
+    zone, power = getattr(planned, "zone", None), getattr(planned, "power", None)
     if zone is None or power is None or not np.isfinite(zone).all() or not np.isfinite(power).all():
         return None
-    rule = getattr(action, "rule", None)
+    rule = getattr(planned, "rule", None)
     told = None if rule is None else {"plan": rule.plan, "rule": rule.rule, "saving": rule.saving}
-    return {"step": float(action.step), "zone": zone.tolist(), "power": power.tolist(), "rule": told}
+    return {"step": float(planned.step), "zone": zone.tolist(), "power": power.tolist(), "rule": told}
 
 
 def forecast_to_dict(forecast: Forecast) -> dict[str, Any]:
@@ -169,14 +177,18 @@ def forecast_of_dict(content: Mapping[str, Any]) -> Forecast:
     return Forecast(pd.DataFrame(columns, index=pd.DatetimeIndex(index).tz_convert(content["timezone"])))
 
 
-def needed_columns(site: Site) -> tuple[str, ...]:
+def needed_columns(site: Site, controller: Controller) -> tuple[str, ...]:
     """Name the measurements that plans rest on: all but those of points that are set.
 
     Parameters
     ----------
     site : Site
         As read.
+    controller : Controller
+        Of the site.
     """
+    if isinstance(controller, BuildingController):
+        return tuple(name for name in controller.columns if name in site.file.points)
     zones = {f"{zone}/zone_air_temperature_sensor" for zone in site.plant.zones}
     kept = [name for name in site.file.points if name not in site.plant.actuators]
     return tuple(name for name in kept if name in zones or name.endswith(OUTDOOR_TEMPERATURE) or "power" in name)

@@ -15,6 +15,7 @@ from mpc.errors import LiveError
 from mpc.live.clock import Clock, SimulatedClock
 from mpc.live.site_file import BacnetLink, PointEntry, SiteFile
 from mpc.loop.conversion import Conversion, conversion
+from thermal.case.load import NAME, read_building_file
 from thermal.case.points import POINT_TYPES
 from thermal.case.schema_file import read_mapping, schema_error
 from thermal.errors import nearest
@@ -55,7 +56,6 @@ class Site:
         here = self.path.parent
         self.plant_path = here / self.file.plant
         self.plant: PlantFile = read_description(self.plant_path)
-        self.model_path = None if self.file.model is None else here / self.file.model
         self.folder = here / self.file.folder
         self._check()
         self.folder.mkdir(parents=True, exist_ok=True, mode=0o700)
@@ -120,7 +120,7 @@ class Site:
         missing = [point for point in needed if point not in file.points]
         LiveError.unless(not missing, f"{name}: points", "the temperature of each zone", f"none of {missing}")
         if file.controller == "mpc":
-            advice = "buildingmpc identify, then model: FOLDER; or controller: full_speed"
+            advice = "model: FOLDER of buildingmpc identify, or {building: CASE}; or controller: full_speed"
             LiveError.unless(file.model is not None, f"{name}: model", "a model for mpc", "none", advice)
         hosts = [getattr(link, "host", getattr(link, "address", "")) for link in file.connections.values()]
         local = all(host.startswith(("127.", "localhost", "::1")) for host in hosts)
@@ -131,12 +131,22 @@ class Site:
 
     def _hash(self) -> str:
         total = hashlib.sha256()
-        parts = [self.path, self.plant_path]
-        if self.model_path is not None:
-            parts += sorted(self.model_path.glob("model.json")) if self.model_path.is_dir() else [self.model_path]
-        for part in parts:
+        for part in (self.path, self.plant_path, *self._model_files()):
             total.update(part.read_bytes() if part.is_file() else str(part).encode())
         return total.hexdigest()
+
+    def _model_files(self) -> list[Path]:
+        """Files that make the model."""
+        here, model = self.path.parent, self.file.model
+        if model is None:
+            return []
+        if isinstance(model, str):
+            path = here / model
+            return sorted(path.glob("model.json")) if path.is_dir() else [path]
+        place = here / model.building
+        folder = place if place.is_dir() else place.parent
+        plans = [folder / floor.plan for floor in read_building_file(folder).floors or ()]
+        return [folder / NAME, *plans, *([] if model.parameters is None else [here / model.parameters])]
 
     def limits(self) -> dict[str, Any]:
         """Give the guard's limits with their defaults, by the names of `GuardEntry` [s]."""

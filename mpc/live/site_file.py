@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from mpc.adapters.described.schema import Kelvin
 from thermal.case.building import Entry, Number, Positive, Text
@@ -233,6 +233,56 @@ class NightlyEntry(Entry):
     parameters: Text | None = None
 
 
+class OwnControl(Entry):
+    """What a building's own control sets by the outdoor temperature: straight lines between a cold and a warm day.
+
+    Parameters
+    ----------
+    cold, warm : float
+        Outdoor temperatures between which the setpoints move [K], or with their unit.
+    air, water : tuple of float
+        Supply air and supply water on the cold and on the warm day [K], or with their unit.
+    """
+
+    cold: Kelvin = 266.15
+    warm: Kelvin = 289.15
+    air: tuple[Kelvin, Kelvin] = (291.15, 286.15)
+    water: tuple[Kelvin, Kelvin] = (353.15, 323.15)
+
+    @model_validator(mode="after")
+    def _rising(self) -> OwnControl:
+        if not self.cold < self.warm:
+            raise ValueError("expected a cold day that is colder than the warm one")
+        return self
+
+
+class BuildingModel(Entry):
+    """The model of a building of air handlers, for ``mpc``.
+
+    Parameters
+    ----------
+    building : str
+        Folder of the case, or its ``building.yaml``, relative to the site's file; points of the site bear its names.
+    parameters : str, optional
+        A ``calibration.json``, relative to the site's file; starting values by default.
+    own_control : OwnControl
+        What plans are held against.
+    """
+
+    building: Text
+    parameters: Text | None = None
+    own_control: OwnControl = Field(default_factory=OwnControl)
+
+
+Model = Annotated[
+    Annotated[Text, Tag("<folder>")] | Annotated[BuildingModel, Tag("<building>")],
+    Discriminator(
+        lambda value: "<folder>" if isinstance(value, str) else "<building>",
+        custom_error_type="model", custom_error_message="Input should be a folder, or a building",
+    ),
+]  # fmt: skip
+
+
 class SiteFile(Entry):
     """A ``site.yaml``.
 
@@ -245,9 +295,9 @@ class SiteFile(Entry):
     plant : str
         The ``plant.yaml``, relative to this file: zones, comfort, prices, weather, forecasts, control step.
     controller : {"mpc", "full_speed"}
-        Optimal control by the model of ``buildingmpc identify``, or the rule without any.
-    model : str, optional
-        Folder of the model, relative to this file.
+        Optimal control by a model, or the rule without any.
+    model : str or BuildingModel, optional
+        Folder of the model of ``buildingmpc identify``, relative to this file; or a calibrated building.
     folder : str
         For logs, spool and sockets, relative to this file.
     database : DatabaseEntry
@@ -274,7 +324,7 @@ class SiteFile(Entry):
     name: Text
     plant: Text
     controller: Literal["mpc", "full_speed"] = "mpc"
-    model: Text | None = None
+    model: Model | None = None
     folder: Text = "live"
     database: DatabaseEntry
     connections: Annotated[

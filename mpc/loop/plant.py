@@ -111,12 +111,20 @@ class Measurements(Mapping[str, float]):
         return pd.Series(values, index=list(self.columns), name=self.stamp)
 
 
-class Plant(Protocol):
-    """A building with its plant that a controller can be tested on; hands out measurements, never states."""
+class Actuated(Protocol):
+    """What a controller can be made for: a plant, or a building that is reached otherwise."""
 
     @property
     def control_step(self) -> float:
         """Time between two actions [s]."""
+
+    @property
+    def actuators(self) -> tuple[Actuator, ...]:
+        """What a controller may set, required ones first."""
+
+
+class Plant(Actuated, Protocol):
+    """A building with its plant that a controller can be tested on; hands out measurements, never states."""
 
     @property
     def zone_names(self) -> tuple[str, ...]:
@@ -125,10 +133,6 @@ class Plant(Protocol):
     @property
     def columns(self) -> tuple[str, ...]:
         """Names of the measurements."""
-
-    @property
-    def actuators(self) -> tuple[Actuator, ...]:
-        """What a controller may set, required ones first."""
 
     @property
     def finished(self) -> bool:

@@ -22,7 +22,7 @@ from mpc.control.solvers.sequential import SequentialSolver
 from mpc.control.solvers.uncertainty import Margin
 from mpc.errors import ControlError
 from mpc.loop.actuators import SUPPLY_AIR, SUPPLY_WATER, Actuator, need_actuator
-from mpc.loop.plant import Plant
+from mpc.loop.plant import Actuated
 from mpc.loop.reduced import ReducedBuilding
 from mpc.loop.sensors import PlantDevices
 from mpc.loop.simulated import SimulatedPlant
@@ -178,7 +178,7 @@ class Site:
 
 def make_controller(
     model: ReducedModel,
-    plant: Plant,
+    plant: Actuated,
     *,
     site: Site | None = None,
     settings: ControllerSettings | None = None,
@@ -193,8 +193,8 @@ def make_controller(
     ----------
     model : ReducedModel
         Of the building, `control_model`; it may have effects.
-    plant : Plant
-        Whose setpoints are to be chosen: its control step and actuators count, nothing else of it.
+    plant : Plant, or an object with its `control_step` and `actuators`
+        Whose setpoints are to be chosen.
     site : Site, optional
         Building and HVAC system; those of a `SimulatedPlant` by default.
     settings : ControllerSettings, optional

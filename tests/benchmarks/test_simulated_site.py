@@ -19,6 +19,7 @@ from mpc.live.links.make import make_links
 from mpc.live.outlook import Outlook
 from mpc.live.planner import Planner, forecast_to_dict
 from mpc.live.site import Site
+from mpc.scenario.forecast import Forecast
 
 PATIENCE = 30.0  # s
 Make = Callable[..., Any]
@@ -34,7 +35,7 @@ def make_site(script: Callable[[str], ModuleType], tmp_path: Path) -> Iterator[M
         script(name)
 
     def make(plant: Path) -> tuple[Any, Site]:
-        made.append(script("_plant_site").PlantSite(plant, tmp_path / "site", 1.001))
+        made.append(script("_plant_site").PlantSite.described(plant, tmp_path / "site", 1.001))
         return made[-1], Site(made[-1].begin("postgresql:///none"))
 
     yield make
@@ -82,7 +83,7 @@ def check_plan(device: Any, site: Site) -> None:
     outlook = Outlook(site.plant_path, site.plant).at(device.time)
     expected, found = device.plant.forecast().table, outlook.table
     assert len(found) == round(site.plant.forecast.hours * 3600.0 / site.step)
-    parts = round(site.step / device.step)
+    parts = round(site.step / (expected.index[1] - expected.index[0]).total_seconds())
     for column in ("electricity_price", "outside_air_temperature_sensor", *(c for c in found if "comfort" in c)):
         means = expected[column].to_numpy()[: parts * len(found)].reshape(-1, parts).mean(axis=1)
         np.testing.assert_allclose(found[column], means, atol=0.2 if "sensor" in column else 1e-6, err_msg=column)
@@ -135,7 +136,7 @@ def test_a_model_of_energyplus_is_a_site(
     path = tmp_path / "house" / "plant.yaml"
     with pytest.raises(LiveError, match="a folder without an earlier run"):
         make_site(path)
-    plant_site = script("_plant_site").PlantSite
+    plant_site = script("_plant_site").PlantSite.described
     with pytest.raises(LiveError, match="rate: expected more than 1"):
         plant_site(path, tmp_path / "other", 1.0)
     told = yaml.safe_load(path.read_text())
@@ -157,3 +158,61 @@ def test_what_a_device_is_told_becomes_a_value_of_the_actuator(script: Callable[
     assert [taken(speed, value) for value in (-1.0, 0.1, 0.2, 0.6, 2.0)] == [0.0, 0.0, 0.25, 0.6, 1.0]
     switch = Actuator("a/b", "1", 0.0, 1.0, kind="on_off")
     assert [taken(switch, value) for value in (0.4, 0.6, 7.0)] == [0.0, 1.0, 1.0]
+
+
+def test_an_office_with_air_handlers_is_a_site_and_is_planned_by_its_building(
+    script: Callable[[str], ModuleType], tmp_path: Path
+) -> None:
+    from mpc.loop.make import save_pilot
+    from thermal.pilot.building import pilot_building
+
+    pytest.importorskip("rusty_bacnet", reason="needs a BACnet device of another stack: pip install rusty-bacnet")
+    pytest.importorskip("bacpypes3", reason="needs the extra [live]")
+    for name in ("_bacnet_device", "_site_files", "_plant_site"):
+        script(name)
+    pilot = script("_pilot_site")
+    building = pilot_building(1, floor_area=200.0, zones=4, name="office")
+    plant = pilot.OwnControl(building, "2023-01-09", 0.1, 1)
+    save_pilot(tmp_path / "case", building, plant.settings, start="2023-01-08", days=1, setpoints=pilot.OWN)
+    own = {"air": ["13 degC", "13 degC"], "water": ["75 degC", "75 degC"]}
+    model = {"building": "../case", "own_control": own}
+    file, plant_site = plant.described("office", "2023-01-09"), script("_plant_site").PlantSite
+    device = plant_site(file, plant, tmp_path / "site", 1.001, pilot.CONTROL_STEP)
+    try:
+        path = device.begin("postgresql:///none", more={"controller": "mpc", "model": model})
+        site = Site(path)
+        check_plan(device, site)
+        outlook = Outlook(site.plant_path, site.plant).at(device.time)
+        gains = [column for column in outlook.table if column.endswith("/internal_gain")]
+        # lights and equipment beside people
+        np.testing.assert_allclose(outlook.table[gains], plant.forecast().table[gains][: len(outlook.table)], rtol=1e-9)
+        planner = Planner(site)
+        inputs = {"begin": device.time, "means": dict(device.seen), "forecast": forecast_to_dict(outlook), "trouble": ""}
+        plan = planner.plan(inputs)
+        assert plan["status"] == "planned" and set(plan["values"]) == set(site.writable) == set(plant.own)
+        assert len(plan["ahead"]["zone"]) == 49 and len(plan["ahead"]["zone"][0]) == 4
+        assert plan["ahead"]["rule"]["rule"] > plan["ahead"]["rule"]["plan"] > 0.0  # at night 75 degC are a waste
+        assert Planner(site).plan(inputs) == plan
+        without = Forecast(outlook.table[["outside_air_temperature_sensor"]])
+        lost = planner.plan(inputs | {"forecast": forecast_to_dict(without)})
+        assert lost["values"] == {} and lost["status"].startswith("no plan: forecast lacks 'electricity_price'")
+
+        water = "BOILER/supply_water_temperature_setpoint"
+        seen = operated(device, site, water, 330.0)
+        assert seen == pytest.approx((348.15, 330.0, 348.15))
+
+        told = yaml.safe_load(path.read_text())
+        before = site.hash
+        told["model"]["own_control"]["cold"] = "20 degC"
+        path.write_text(yaml.safe_dump(told))
+        with pytest.raises(LiveError, match=r"model.building.own_control: .*colder than the warm one"):
+            Site(path)
+        del told["model"]["own_control"]["cold"], told["points"]["VAV_F1_C01/supply_air_flowrate_sensor"]
+        path.write_text(yaml.safe_dump(told))
+        with pytest.raises(LiveError, match=r"points: expected all that .* none of VAV_F1_C01/supply_air_flowrate"):
+            Planner(Site(path))
+        plans = (tmp_path / "case" / "building.yaml").read_text()
+        (tmp_path / "case" / "building.yaml").write_text(plans + "\n# drawn again\n")
+        assert Site(path).hash != before
+    finally:
+        device.stop()

@@ -6,10 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
 from mpc.adapters.described.schema import Comfort, Hours, PlantFile, Signal, Value
 from mpc.adapters.described.series import NamedSeries
-from mpc.errors import PlantError
+from mpc.errors import PlantError, ScenarioError
 from mpc.loop.conversion import conversion
 from mpc.scenario.forecast import DAY_AHEAD_ERRORS, Forecaster
 from mpc.scenario.gains import InternalGains
@@ -209,6 +210,35 @@ class SeriesOccupancy(Occupancy):
         return np.column_stack([self.by_zone[zone].on(grid) for zone in zones])
 
 
+@dataclass(frozen=True)
+class SeriesGains(InternalGains):
+    """Heat of people beside that of lights and equipment as values over time.
+
+    Parameters
+    ----------
+    others : ndarray, shape (n_steps, n_zone)
+        Heat of lights and equipment on the scenario's grid, none of which radiates [W].
+    """
+
+    equipment: float = 0.0
+    lights: float = 0.0
+    others: FloatArray = field(default_factory=lambda: np.zeros((1, 1)))
+
+    def __post_init__(self) -> None:
+        ScenarioError.unless((self.others >= 0.0).all(), "gains", "heat of 0 W or more", f"{self.others.min():g} W")
+
+    def heat(self, occupancy: ArrayLike, people: ArrayLike, areas: ArrayLike, *, radiant: bool = False) -> FloatArray:
+        """Sensible heat given to each zone, shape (n_steps, n_zone) [W].
+
+        Parameters
+        ----------
+        occupancy, people, areas, radiant
+            As of `InternalGains.heat`.
+        """
+        of_people = super().heat(occupancy, people, areas, radiant=radiant)
+        return of_people if radiant else of_people + self.others
+
+
 def described_building(file: PlantFile) -> Building:
     """Give what a description says of the building: zones without walls.
 
@@ -281,9 +311,10 @@ def _scenario(file: PlantFile, folder: Path, source: SeriesSource, grid: StepGri
     people = {name: rate(zone.people, f"zones.{name}.people") for name, zone in file.zones.items()}
     most = {name: float(number.on(grid).max()) for name, number in people.items()}
     bands = {name: _band(zone.comfort, rate, f"zones.{name}.comfort") for name, zone in file.zones.items()}
+    others = [rate(zone.gains, f"zones.{name}.gains").on(grid) for name, zone in file.zones.items()]
     return build_scenario(
         described_building(file), grid, weather, tariff, carbon=carbon, occupancy=SeriesOccupancy(most, by_zone=people),
-        gains=InternalGains(equipment=0.0, lights=0.0), comfort=bands,
+        gains=SeriesGains(others=np.column_stack(others)), comfort=bands,
     )  # fmt: skip
 
 
@@ -314,7 +345,7 @@ def _names(file: PlantFile) -> dict[str, str]:
     for name, zone in file.zones.items():
         edges = {} if zone.comfort is None else {"lower": zone.comfort.lower, "upper": zone.comfort.upper}
         asked |= {f"zones.{name}.comfort.{edge}": value for edge, value in edges.items()}
-        asked[f"zones.{name}.people"] = zone.people
+        asked |= {f"zones.{name}.people": zone.people, f"zones.{name}.gains": zone.gains}
     for key, part in (("prices", file.prices), ("emissions", file.emissions)):
         asked |= {} if part is None else {f"{key}.electricity": part.electricity, f"{key}.gas": part.gas}
     if isinstance(file.weather, dict):

@@ -177,6 +177,8 @@ class Zone(Entry):
         Its band; BOPTEST's office by default.
     people : float, str or Hours
         Number of people in it [-].
+    gains : float, str or Hours
+        Heat of lights and equipment [W], beside that of people.
     """
 
     temperature: Named
@@ -184,6 +186,7 @@ class Zone(Entry):
     volume: Positive | None = None
     comfort: Comfort | None = None
     people: Value = 0.0
+    gains: Value = 0.0
 
 
 class Energy(Entry):

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from mpc.control.controller.observer import Observer
+from mpc.control.controller.outlook import PlanOutlook
 from mpc.control.controller.ranges import READINGS
 from mpc.control.controller.site import Action, ControllerSettings, Reading, SitePoints, Source
 from mpc.control.controller.watch import FarFromModel, PossibleReadings, StuckSensors, explain_comfort
@@ -56,6 +57,11 @@ class MpcController:
         Called as ``signals(forecast, stamps)``; gives the boundaries beside the outdoor air and the signals of
         effects, one row a step. Needed where the model has any.
 
+    Attributes
+    ----------
+    outlook : PlanOutlook or None
+        What the plan of the last step is expected to lead to; None where something else is followed.
+
     Notes
     -----
     What goes wrong in a step does not raise: what is missing is filled in or falls back, and `Action.reasons` says so.
@@ -80,6 +86,7 @@ class MpcController:
         noise = np.sqrt(self.observer.kalman.whole.noise_variance)
         self._stuck = StuckSensors(self.points.zones, noise, self.settings.false_alarm, self.settings.resolution)
         self._far = FarFromModel(self.points.zones, self.observer.innovation_deviation)
+        self.outlook: PlanOutlook | None = None
 
     def step(self, measurements: Measured, forecast: Forecast | None, now: pd.Timestamp | None = None) -> Action:
         """Choose setpoints for the next control step.
@@ -100,7 +107,7 @@ class MpcController:
             Only in a first step that nothing tells the time of.
         """
         reasons: list[str] = []
-        stamp, solution = self._now(measurements, forecast, now, reasons), None
+        stamp, solution, self.outlook = self._now(measurements, forecast, now, reasons), None, None
         seen = self._possible.update(measurements, stamp, reasons)
         try:
             data = self._data(seen, _possible(forecast, reasons), stamp, reasons)
@@ -109,7 +116,10 @@ class MpcController:
         except (ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
             reasons.append(f"state or forecast could not be used: {error}")
         else:
-            solution = self._solve(data, stamp, reasons)
+            rules = self.settings.rule.plan(self.problem.predictor, data.outdoor_temperature)
+            solution = self._solve(data, rules, stamp, reasons)
+            if solution is not None and solution.usable:
+                self.outlook = PlanOutlook(self.problem, data, solution, rules)
         values, source = self._choose(solution, stamp, seen, reasons)
         self._known.previous = self._safe(values, reasons)
         named = self.points.setpoints(self._channels, self._known.previous, self.problem.predictor.hvac)
@@ -240,11 +250,12 @@ class MpcController:
         self._demand.add(read.electricity, now, self._horizon.control_step)
         self._known.water = read.water if np.isfinite(read.water) else self._known.water
 
-    def _solve(self, data: HorizonData, now: pd.Timestamp, reasons: list[str]) -> Solution | None:
+    def _solve(
+        self, data: HorizonData, rules: FloatArray, now: pd.Timestamp, reasons: list[str]
+    ) -> Solution | None:
         reasons.extend(self.problem.explain_limits(data))
         back_off = self.settings.back_off
         narrowed = data if back_off is None else back_off.narrow(data)
-        rules = self.settings.rule.plan(self.problem.predictor, data.outdoor_temperature)
         try:
             solution, changed = self._starts.solve(
                 self.solver, narrowed, self._shifted(now), rules, now, self.settings.time_limit

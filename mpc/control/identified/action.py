@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 import pandas as pd
 
-from mpc.control.identified.by_rule import RuleEstimate
+from mpc.control.rule_estimate import RuleEstimate
 from mpc.control.solvers.stages import StageSolution
 from thermal._types import FloatArray
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from calibration.estimation.state_space import REFERENCE
@@ -11,31 +9,9 @@ from mpc.baselines.plants import DIFFERENCE, LEAD
 from mpc.control.identified.ahead import Ahead
 from mpc.control.identified.beyond import bought
 from mpc.control.identified.problem import IdentifiedProblem
+from mpc.control.rule_estimate import RuleEstimate
 from mpc.scenario.rates import KILOWATT_HOUR
 from thermal._types import FloatArray
-
-
-@dataclass(frozen=True)
-class RuleEstimate:
-    """Cost of a plan and of the rule over the same horizon.
-
-    Parameters
-    ----------
-    plan, rule : float
-        Bought over the horizon [currency].
-    stored : float
-        Heat that the plan leaves in the building beyond what the rule leaves, at what the rule's heat costs [currency];
-        negative where the plan ends colder.
-    """
-
-    plan: float
-    rule: float
-    stored: float
-
-    @property
-    def saving(self) -> float:
-        """Share of the rule's cost that the plan saves, what it leaves in the building included [-]; 0 without cost."""
-        return (self.rule - self.plan + self.stored) / self.rule if self.rule > 0.0 else 0.0
 
 
 def estimate_rule(

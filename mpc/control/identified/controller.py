@@ -14,7 +14,7 @@ from calibration.estimation.state_space import REFERENCE
 from mpc.control.identified.action import PlannedAction
 from mpc.control.identified.ahead import Ahead
 from mpc.control.identified.beyond import PowerLearner, bought
-from mpc.control.identified.by_rule import RuleEstimate, estimate_rule
+from mpc.control.identified.by_rule import estimate_rule
 from mpc.control.identified.conformal import AFTER, ConformalBackOff, Guarantee, risen
 from mpc.control.identified.electric import Electric, ElectricNow
 from mpc.control.identified.meter import ElectricMeter
@@ -22,6 +22,7 @@ from mpc.control.identified.mixed_integer import WHOLE, RunLimits, RunPlanner
 from mpc.control.identified.observer import GreyBoxObserver
 from mpc.control.identified.problem import SCALE, IdentifiedProblem
 from mpc.control.identified.thermostats import Thermostats
+from mpc.control.rule_estimate import RuleEstimate
 from mpc.control.solvers.solution import Status
 from mpc.control.solvers.stages import StageData, StageSolution, StageSolver
 from mpc.errors import ControlError

@@ -160,7 +160,7 @@ def test_plans_repeat_and_a_failure_is_a_status(tmp_path: Path) -> None:
     assert "no number" in Planner(site, Bad(float("nan"))).plan(inputs)["status"]
     assert "ZeroDivisionError" in Planner(site, Bad(ZeroDivisionError("x"))).plan(inputs)["status"]
     assert Planner(site, Bad(1.0)).plan(inputs)["other"] == {"boiler/valve": 1.0}
-    assert needed_columns(site) == ("north/zone_air_temperature_sensor",)
+    assert needed_columns(site, Planner(site).controller) == ("north/zone_air_temperature_sensor",)
 
 
 def test_what_the_page_shows_of_a_plan_and_what_the_day_has_cost(tmp_path: Path) -> None:
