@@ -237,9 +237,9 @@ def tables(found: Mapping[str, Any]) -> str:
     told = (
         f"Predicted in shadow {_percent(predicted)}, saved in act {_percent(realised)}. {found['planned']} of "
         f"{found['plans']} plans were made. {found['points']} points, {samples['readings']} readings "
-        f"{samples['between']:.0f} s apart (median), {samples['samples']:,.0f} samples, {samples['stored']:,.0f} of them "
-        f"committed at once; {found['decisions']:,} decisions and plans on {found['lines']:,} lines of logs repeated, "
-        f"{len(found['different'])} differ. Clock {found['rate']:g} times real time.\n"
+        f"{samples['between']:.0f} s apart (median), {samples['samples']:,.0f} samples, {samples['stored']:,.0f} of "
+        f"them committed at once; {found['decisions']:,} decisions and plans on {found['lines']:,} lines of logs "
+        f"repeated, {len(found['different'])} differ. Clock {found['rate']:g} times real time.\n"
     )
     heads_of_use = ["process", "CPU at real time, share of a core", "memory, most [MB]", "starts"]
     return f"{markdown(heads, rows)}\n{told}\n{markdown(heads_of_use, [*parts, ['all', *whole, '']])}"

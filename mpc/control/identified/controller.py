@@ -395,7 +395,6 @@ class IdentifiedController:
 
     def _powers(self, solution: StageSolution, ahead: Ahead) -> FloatArray:
         """Give expected electricity and other carriers, shape (N, 2) [W]."""
-        model, levels = self.model, solution.decisions
-        powers = bought(model, ahead.beyond, solution.states[:-1], levels, ahead.outdoor).sum(axis=1)
-        powers = powers + model.bought_anyway
+        model, states = self.model, solution.states[:-1]
+        powers = bought(model, ahead.beyond, states, solution.decisions, ahead.outdoor).sum(axis=1) + model.bought_anyway
         return np.column_stack([powers[:, 0], powers[:, 1:].sum(axis=1)])
