@@ -395,6 +395,6 @@ class IdentifiedController:
 
     def _powers(self, solution: StageSolution, ahead: Ahead) -> FloatArray:
         """Give expected electricity and other carriers, shape (N, 2) [W]."""
-        model, states = self.model, solution.states[:-1]
-        powers = bought(model, ahead.beyond, states, solution.decisions, ahead.outdoor).sum(axis=1) + model.bought_anyway
+        by_map = bought(self.model, ahead.beyond, solution.states[:-1], solution.decisions, ahead.outdoor)
+        powers = by_map.sum(axis=1) + self.model.bought_anyway
         return np.column_stack([powers[:, 0], powers[:, 1:].sum(axis=1)])
