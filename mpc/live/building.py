@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import pandas as pd
+
 from mpc.control.controller.controller import MpcController
 from mpc.control.controller.outlook import PlanOutlook
 from mpc.control.controller.site import Action, ControllerSettings, ResetRule
@@ -64,10 +66,28 @@ class BuildingController:
         forecast : Forecast
             From now on.
         """
-        if self._gains and forecast is not None:
-            none = {str(c): 0.0 for c in forecast.table if str(c).endswith("/internal_gain")}
-            forecast = Forecast(forecast.table.assign(**none))
+        if forecast is not None:
+            forecast = Forecast(self._without(forecast.table))
         return self.controller.step(measurements, forecast)
+
+    def start_up(self, telemetry: pd.DataFrame) -> None:
+        """Bring the state up from the time before the first step.
+
+        Parameters
+        ----------
+        telemetry : DataFrame
+            As of `MpcController.start_up`.
+        """
+        self.controller.start_up(self._without(telemetry))
+
+    @property
+    def station(self) -> str:
+        """Name of the weather station."""
+        return self.controller.points.weather_station
+
+    def _without(self, table: pd.DataFrame) -> pd.DataFrame:
+        gains = [str(column) for column in table if str(column).endswith("/internal_gain")]
+        return table.assign(**dict.fromkeys(gains, 0.0)) if self._gains else table
 
 
 def building_controller(site: Site, model: BuildingModel, actuators: tuple[Actuator, ...]) -> BuildingController:

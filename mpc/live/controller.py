@@ -13,10 +13,12 @@ import pandas as pd
 
 from mpc.errors import HistorianError, LiveError, MpcError
 from mpc.live.audit import AuditLog, code_version
+from mpc.live.building import BuildingController
 from mpc.live.clock import Clock
 from mpc.live.guard.socket import GuardClient
 from mpc.live.historian.store import Historian
 from mpc.live.outlook import Outlook
+from mpc.live.past import recent_past
 from mpc.live.picture import DayCost, picture
 from mpc.live.planner import Planner, forecast_to_dict, needed_columns, no_plan
 from mpc.live.site import Site
@@ -68,6 +70,7 @@ class ControlProcess:
         threading.Thread(target=self._beat, daemon=True).start()
         client = GuardClient(self.site.sockets)
         step = self.site.step
+        self._start_up(step * (self.clock.wall() // step))
         try:
             while not self._stop.is_set():
                 now = self.clock.wall()
@@ -81,6 +84,13 @@ class ControlProcess:
             client.close()
             self.historian.close()
             self.log.close()
+
+    def _start_up(self, begin: float) -> None:
+        """Let the controller know what an earlier process saw, and write down what that was."""
+        if isinstance(self.planner.controller, BuildingController):
+            past = recent_past(self.site.folder, begin, self.columns)
+            self.log.append("start_up", {"past": past, "begin": begin})
+            self.planner.start_up(past, begin)
 
     def _watch(self, end: float, plan: dict[str, Any], client: GuardClient) -> None:
         """Wait for the end of a step, or, without a plan, for a part of it; withdraw the plan when its inputs fail."""

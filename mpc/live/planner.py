@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,10 +15,11 @@ from mpc.baselines.plants import FullSpeed
 from mpc.control.controller.site import Action
 from mpc.control.identified.action import PlannedAction
 from mpc.control.identified.controller import IdentifiedController
-from mpc.errors import LiveError, MpcError
+from mpc.errors import ControlError, LiveError, MpcError
 from mpc.identify.machines import find_machines
 from mpc.identify.model import read_model
 from mpc.live.building import BuildingController, building_controller
+from mpc.live.past import past_table
 from mpc.live.site import Site
 from mpc.live.site_file import BuildingModel
 from mpc.loop.actuators import Actuator
@@ -80,6 +82,21 @@ class Planner:
         self.site = site
         self.controller = controller or site_controller(site)
         self._layout = PointLayout(tuple(site.file.points), site.plant.location.timezone)
+
+    def start_up(self, past: Sequence[Mapping[str, Any]], begin: float) -> None:
+        """Let the controller of a building know the time before its first plan.
+
+        Parameters
+        ----------
+        past : sequence of mapping
+            Of `mpc.live.past.recent_past`.
+        begin : float
+            Of the step that is to be planned [s].
+        """
+        if isinstance(self.controller, BuildingController) and len(past) > 1:
+            place = self.site.plant.location.timezone, self.controller.station
+            with contextlib.suppress(ControlError):  # without a temperature the first plan begins at what is seen
+                self.controller.start_up(past_table(past, begin, self.site.step, *place))
 
     def plan(self, inputs: Mapping[str, Any]) -> dict[str, Any]:
         """Plan a step.

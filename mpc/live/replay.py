@@ -83,6 +83,8 @@ def replay_log(path: Path, site: Path | None = None, before: str | None = None) 
                 planner = _planner(site, content, found)
         elif kind == "tick" and guard is not None:
             _compare(found, path, at, guard.decide(content["tick"]), content["decision"])
+        elif kind == "start_up" and planner is not None:
+            planner.start_up(content["past"], content["begin"])
         elif kind == "plan" and planner is not None:
             again = planner.plan(content["inputs"])
             _compare(found, path, at, again, {key: content["plan"].get(key) for key in again})

@@ -14,10 +14,12 @@ import pytest
 import yaml
 
 from mpc.errors import LiveError, PlantError
+from mpc.live.audit import AuditLog
 from mpc.live.clock import set_clock
 from mpc.live.links.make import make_links
 from mpc.live.outlook import Outlook
-from mpc.live.planner import Planner, forecast_to_dict
+from mpc.live.past import recent_past
+from mpc.live.planner import Planner, forecast_to_dict, needed_columns
 from mpc.live.site import Site
 from mpc.scenario.forecast import Forecast
 
@@ -172,7 +174,7 @@ def test_an_office_with_air_handlers_is_a_site_and_is_planned_by_its_building(
         script(name)
     pilot = script("_pilot_site")
     building = pilot_building(1, floor_area=200.0, zones=4, name="office")
-    plant = pilot.OwnControl(building, "2023-01-09", 0.1, 1)
+    plant = pilot.OwnControl(building, "2023-01-09", 0.2, 1)
     save_pilot(tmp_path / "case", building, plant.settings, start="2023-01-08", days=1, setpoints=pilot.OWN)
     own = {"air": ["13 degC", "13 degC"], "water": ["75 degC", "75 degC"]}
     model = {"building": "../case", "own_control": own}
@@ -196,6 +198,25 @@ def test_an_office_with_air_handlers_is_a_site_and_is_planned_by_its_building(
         without = Forecast(outlook.table[["outside_air_temperature_sensor"]])
         lost = planner.plan(inputs | {"forecast": forecast_to_dict(without)})
         assert lost["values"] == {} and lost["status"].startswith("no plan: forecast lacks 'electricity_price'")
+
+        log = AuditLog(site.folder, "controller", device.time)
+        going, fresh, again = (Planner(site) for _ in range(3))
+        for _ in range(12):
+            made = going.plan(inputs)
+            assert made["status"] == "planned"
+            log.append("plan", {"inputs": inputs, "plan": made})
+            for _ in range(round(site.step / device.step)):
+                step(device, site)
+            outlook = Outlook(site.plant_path, site.plant).at(device.time)
+            inputs |= {"begin": device.time, "means": dict(device.seen), "forecast": forecast_to_dict(outlook)}
+        log.close()
+        again.start_up(recent_past(site.folder, device.time, needed_columns(site, again.controller)), device.time)
+        states = []
+        for one in (going, fresh, again):
+            one.plan(inputs)
+            states.append(one.controller.controller.observer.modal_state)
+        apart = [float(np.linalg.norm(state - states[0])) for state in states[1:]]
+        assert apart[1] < 1e-9 * apart[0]  # its walls are as warm as those of the one that went on
 
         water = "BOILER/supply_water_temperature_setpoint"
         seen = operated(device, site, water, 330.0)
