@@ -112,9 +112,11 @@ class PlantSite(BacnetDevice):
         # a database may have samples of an earlier run of this plant, which would lie ahead of the clock
         schema = re.sub("[^a-z0-9_]", "_", f"site_{self.file.name.lower()[:40]}_{time.time():.0f}")
         controlled = {} if model is None else {"controller": "mpc", "model": str(model.resolve())}
+        # a second of the machine is `rate` seconds here: of planning, and between two clocks that are read
+        guard = {"clock_jump": max(5.0, self.rate), "input_age": self.file.control_step}
         site = write_site(
             self.folder, plant, points, address, clock_rate=self.rate, database={"address": database, "schema": schema},
-            page={"port": port}, guard={"clock_jump": max(5.0, self.rate)}, **controlled, **(more or {}),
+            page={"port": port}, guard=guard, **controlled, **(more or {}),
         )  # fmt: skip
         (self.folder / "live").mkdir(mode=0o700)
         set_clock(self.folder / "live" / "clock.json", self.time)

@@ -2,9 +2,10 @@
 
 The pilot (123 zones, 890 points) is a plant of ours whose parameters are drawn, with sun and people, stepped each
 minute behind a real BACnet/IP device; its own control holds 13 degC of supply air and 75 degC of supply water. The
-model is what ``buildingmpc calibrate`` makes of the two weeks before (``--prepare``). From Monday on two days in
-shadow, one in advise, on which an operator approves all at 8, 12 and 16 h, the rest in act; modes and approvals by the
-command. The same days under its own control are run beside, so that the saving is known.
+model is what ``buildingmpc calibrate`` makes of the two weeks before (``--prepare``). From Monday on
+``--days`` in shadow, in advise, on the first of which an operator approves all at 8, 12 and 16 h, and in act; modes
+and approvals by the command. The same days under its own control are run beside, so that the saving is known. Where plans take long on a
+busy machine they are old by the site's clock: choose a lower rate.
 
 Run: ``python benchmarks/pilot_week.py --work FOLDER --prepare``, then ``python benchmarks/pilot_week.py --work FOLDER
 --rate 80 --out results/pilot_week --publish``. Needs ``[live]``, PostgreSQL and ``pip install rusty-bacnet``.
@@ -36,9 +37,8 @@ from mpc.live.replay import replay_log
 from mpc.loop.make import save_pilot
 from thermal.pilot.building import pilot_building
 
-#: Monday of the week; days in each mode; local hours at which the operator approves.
-START, SHADOW, ADVISE = "2023-01-09", 2, 1
-APPROVALS = (8, 12, 16)
+#: Monday of the week; local hours at which the operator approves.
+START, APPROVALS = "2023-01-09", (8, 12, 16)
 
 #: Days of telemetry that the model is calibrated on [d].
 BEFORE = 14
@@ -62,15 +62,15 @@ class Week:
         With ``case`` and ``calibrated``.
     rate : float
         How many times faster than real time clocks run [-].
-    days : int
-        Of the week.
+    days : tuple of int
+        In shadow, advise and act.
     seed : int
         Of building, weather, people and noise.
     """
 
-    def __init__(self, work: Path, rate: float, days: int, seed: int) -> None:
+    def __init__(self, work: Path, rate: float, days: tuple[int, int, int], seed: int) -> None:
         self.work, self.days = work, days
-        self.plant = OwnControl(pilot_building(seed), START, days, seed)
+        self.plant = OwnControl(pilot_building(seed), START, sum(days), seed)
         file = self.plant.described("pilot", START)
         self.site = PlantSite(file, self.plant, work / "site", rate, CONTROL_STEP)
         self.uses: dict[int, tuple[str, float, float]] = {}
@@ -121,11 +121,11 @@ class Week:
 
     def _orders(self) -> Iterator[tuple[float, list[str]]]:
         """Orders of the operator, by hours since the begin."""
-        advised = 24.0 * SHADOW
+        advised = 24.0 * self.days[0]
         yield advised, ["--mode", "advise"]
         for hour in APPROVALS:
             yield advised + hour + 0.2, ["--approve", "all"]
-        yield advised + 24.0 * ADVISE, ["--mode", "act"]
+        yield advised + 24.0 * self.days[1], ["--mode", "act"]
 
     def _look(self) -> None:
         """Note CPU and memory of each part; one that was started anew counts beside the one before."""
@@ -149,7 +149,7 @@ class Week:
         plans = [entry["content"] for file in sorted(logs.glob("controller-*.jsonl"))
                  for _, entry in read_log(file, None) if entry["kind"] == "plan"]  # fmt: skip
         replays = [replay_log(file, path) for file in sorted(logs.glob("*.jsonl"))]
-        seconds = self.days * 86400.0
+        seconds = sum(self.days) * 86400.0
         by_part: dict[str, list[float]] = {}
         for name, cpu, memory in self.uses.values():
             total = by_part.setdefault(name, [0.0, 0.0, 0])
@@ -162,7 +162,7 @@ class Week:
             "parts": by_part, "lines": sum(r.lines for r in replays), "decisions": sum(r.decisions for r in replays),
             "different": [d for r in replays for d in r.different], "broken": [r.broken for r in replays if r.broken],
             "doubts": _doubts(logs), "orders": self.told, "late": self.site.late, "samples": _samples(logs),
-            "points": len(self.site.columns) + len(self.site.actuators), "rate": self.site.rate,
+            "days": self.days, "points": len(self.site.columns) + len(self.site.actuators), "rate": self.site.rate,
         }  # fmt: skip
 
 
@@ -214,11 +214,11 @@ def _percent(share: float) -> str:
 
 def tables(found: Mapping[str, Any]) -> str:
     """Lay out what was found."""
-    acted, own, days = found["acted"], found["own"], len(found["acted"]["cost"])
+    acted, own, (shadow, advise, _) = found["acted"], found["own"], found["days"]
     ahead = {day: (rule, saved) for day, rule, saved in found["predicted"]}
     rows = []
-    for k in range(days):
-        mode = "shadow" if k < SHADOW else "advise" if k < SHADOW + ADVISE else "act"
+    for k in range(sum(found["days"])):
+        mode = "shadow" if k < shadow else "advise" if k < shadow + advise else "act"
         rule, saved = ahead.get(k, (0.0, 0.0))
         rows.append([
             f"{pd.Timestamp(START) + pd.Timedelta(days=k):%A}", mode, f"{own['cost'][k]:.1f}",
@@ -227,9 +227,9 @@ def tables(found: Mapping[str, Any]) -> str:
         ])  # fmt: skip
     heads = ["day", "mode", "own control [USD]", "as operated [USD]", "saved", "saved by the plans' own prediction",
              "outside the bands, own and operated [K h]"]  # fmt: skip
-    shadow = [ahead[k] for k in range(SHADOW) if k in ahead]
-    predicted = sum(s for _, s in shadow) / sum(r for r, _ in shadow)
-    acting = slice(SHADOW + ADVISE, days)
+    foreseen = [ahead[k] for k in range(shadow) if k in ahead]
+    predicted = sum(s for _, s in foreseen) / sum(r for r, _ in foreseen)
+    acting = slice(shadow + advise, None)
     realised = 1.0 - sum(acted["cost"][acting]) / sum(own["cost"][acting])
     uses, samples = found["parts"], found["samples"]
     parts = [[name, _percent(cpu), f"{memory / 1e6:.0f}", n] for name, (cpu, memory, n) in uses.items()]
@@ -251,7 +251,7 @@ def main() -> None:
     parser.add_argument("--work", type=Path, required=True, help="folder of the case, the model and the site")
     parser.add_argument("--prepare", action="store_true", help="make the case and calibrate")
     parser.add_argument("--rate", type=float, default=80.0)
-    parser.add_argument("--days", type=int, default=5)
+    parser.add_argument("--days", type=int, nargs=3, default=(2, 1, 4), help="in shadow, advise and act")
     parser.add_argument("--seed", type=int, default=7)
     parser.add_argument("--out", type=Path, default=Path("results/pilot_week"))
     parser.add_argument("--publish", action="store_true")
@@ -260,7 +260,7 @@ def main() -> None:
     if options.prepare:
         prepare(work, options.seed)
         return
-    found = Week(work, options.rate, options.days, options.seed).run()
+    found = Week(work, options.rate, tuple(options.days), options.seed).run()
     write(options.out, "pilot_week", tables(found), found, options.publish)
     print(tables(found))
 
