@@ -2,10 +2,10 @@
 
 The pilot (123 zones, 890 points) is a plant of ours whose parameters are drawn, with sun and people, stepped each
 minute behind a real BACnet/IP device; its own control holds 13 degC of supply air and 75 degC of supply water. The
-model is what ``buildingmpc calibrate`` makes of the two weeks before (``--prepare``). From Monday on
-``--days`` in shadow, in advise, on the first of which an operator approves all at 8, 12 and 16 h, and in act; modes
-and approvals by the command. The same days under its own control are run beside, so that the saving is known. Where plans take long on a
-busy machine they are old by the site's clock: choose a lower rate.
+model is what ``buildingmpc calibrate`` makes of the two weeks before (``--prepare``). From Monday on ``--days`` in
+shadow, in advise, where an operator approves all on the first day at 8, 12 and 16 h, and in act; modes and approvals by
+the command. The same days under its own control are run beside, so that the saving is known. Where a busy machine takes
+long to plan, plans are old by the site's clock: choose a lower rate then.
 
 Run: ``python benchmarks/pilot_week.py --work FOLDER --prepare``, then ``python benchmarks/pilot_week.py --work FOLDER
 --rate 80 --out results/pilot_week --publish``. Needs ``[live]``, PostgreSQL and ``pip install rusty-bacnet``.
