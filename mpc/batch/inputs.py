@@ -6,10 +6,14 @@ from typing import Any
 import numpy as np
 
 from mpc.batch.building import Array
-from mpc.loop.noise import BLOCK, NoiseSource
+from mpc.loop.noise import STREAM
+from mpc.loop.random_numbers import compiled_filling, normal_numbers, stream_key
 from mpc.loop.simulated import SimulatedPlant
 from thermal._types import FloatArray, IntArray
 from thermal.units import REFERENCE_TEMPERATURE
+
+#: Members' steps whose noise is drawn together, and steps of one at most.
+_TOGETHER, _LONGEST = 4096, 64
 
 
 def plant_rows(plant: SimulatedPlant) -> dict[str, FloatArray]:
@@ -149,24 +153,27 @@ class DrivingRows:
 
 
 class DrawnNoise:
-    """Noise of many members, drawn for a block of steps at a time: each has the numbers that it has alone.
+    """Noise of many members: each has the numbers that it has alone.
 
     Parameters
     ----------
-    source : NoiseSource
-        Of the plants.
+    width : int
+        Numbers of a step.
     members : int
         How many.
     dtype : numpy.dtype
         Precision.
+    compiled : bool
+        Whether numba draws each step's numbers where they are needed; otherwise those of some steps are drawn together.
     """
 
-    def __init__(self, source: NoiseSource, members: int, dtype: Any) -> None:
-        self.source, self._seeds = source, np.zeros(members, dtype=np.int64)
+    def __init__(self, width: int, members: int, dtype: Any, compiled: bool) -> None:
+        self._keys, self._members = np.zeros(members, dtype=np.uint64), np.arange(members)
+        self._compiled = compiled_filling(np.dtype(dtype)) if compiled else None
+        # few enough to stay in the processor's cache
+        self._block = min(max(_TOGETHER // members, 1), _LONGEST)
         self._numbers = np.full(members, -1, dtype=np.int64)
-        # a step's numbers lie together: turning them to columns when they are needed is cheaper than turning all
-        self._drawn = np.zeros((BLOCK, members, source.width), dtype=dtype)
-        self._members = np.arange(members)
+        self._drawn = np.zeros((width, self._block, 0 if compiled else members), dtype=dtype)
 
     def begin(self, member: int, seed: int) -> None:
         """Give a member a seed.
@@ -176,7 +183,7 @@ class DrawnNoise:
         member, seed : int
             Numbers.
         """
-        self._seeds[member], self._numbers[member] = seed, -1
+        self._keys[member], self._numbers[member] = stream_key(seed, STREAM), -1
 
     def fill(self, steps: IntArray, out: Array) -> None:
         """Fill in the random numbers of a step of each member.
@@ -188,15 +195,15 @@ class DrawnNoise:
         out : ndarray, shape (width, member)
             Filled.
         """
-        numbers, rows = np.divmod(steps, BLOCK)
+        if self._compiled is not None:
+            self._compiled(self._keys, steps, out)
+            return
+        numbers, rows = np.divmod(steps, self._block)
         if (stale := np.flatnonzero(numbers != self._numbers)).size:
-            self._draw(stale, numbers)
-        if rows[0] == rows[-1] and (rows == rows[0]).all():
-            np.copyto(out, self._drawn[rows[0]].T)
-        else:
-            np.copyto(out, self._drawn[rows, self._members].T)
-
-    def _draw(self, members: IntArray, numbers: IntArray) -> None:
-        for member in members.tolist():
-            self._drawn[:, member] = self.source.block(int(numbers[member]), int(self._seeds[member]))
-        self._numbers[members] = numbers[members]
+            each = self._block * numbers[stale] + np.arange(self._block)[:, None]
+            keys = np.broadcast_to(self._keys[stale], each.shape)
+            drawn = normal_numbers(keys.ravel(), each.ravel(), len(out))
+            self._drawn[:, :, stale] = drawn.reshape(len(out), *each.shape)
+            self._numbers[stale] = numbers[stale]
+        same = bool((rows == rows[0]).all())
+        np.copyto(out, self._drawn[:, rows[0]] if same else self._drawn[:, rows, self._members])

@@ -91,7 +91,7 @@ class BatchedPlant:
         )  # fmt: skip
         self._program = Program(self.traced.tape, members, dtype, compiled)
         noise = first.sensors.noise
-        self._noise = None if noise is None else DrawnNoise(noise, members, dtype)
+        self._noise = None if noise is None else DrawnNoise(noise.width, members, dtype, compiled)
         #: Which plant and seed each member has, and the number of the step that comes next, shape (member,).
         self.plant_of, self.seeds, self.now = (np.zeros(members, dtype=np.intp) for _ in range(3))
         self._started = False

@@ -5,10 +5,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mpc.environment.features import LARGEST
 from mpc.environment.vector import VectorEnvironment
 from thermal.batch.functional import HAS_JAX, FunctionalProgram
-from thermal.batch.trace import Tape
 
 if HAS_JAX:
     import jax
@@ -102,9 +100,8 @@ class FunctionalEnvironment:
             batch.traced.tape, [given.row, given.actions, given.noise, *carried],
             [done.measured, done.reward, *carried], batch.dtype,
         )  # fmt: skip
-        tape = Tape()
-        seen = tape.value(len(worlds.single.plants[0].columns))
-        self._scaled = FunctionalProgram(tape, [seen], [tape.keep(layout.measured(seen), layout.own)], batch.dtype)
+        tape, seen, scaled = layout.trace(len(worlds.single.plants[0].columns))
+        self._scaled = FunctionalProgram(tape, [seen], [scaled], batch.dtype)
         worlds.reset(seed=seed)
         members = worlds.num_envs
         rows, beside, *values = (
@@ -231,7 +228,7 @@ class FunctionalEnvironment:
         """
         (own,) = self._scaled(measured)
         beside = self._row(self.tables.seen, state.beginning, state.step)
-        return jnp.clip(jnp.nan_to_num(jnp.concatenate([own, beside])), -LARGEST, LARGEST).T
+        return jnp.concatenate([own, beside]).T
 
     def _row(self, table: Any, beginning: Any, step: Any) -> Any:
         return table[beginning, jnp.minimum(step, table.shape[1] - 1)].T

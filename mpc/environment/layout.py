@@ -11,6 +11,8 @@ from mpc.environment.features import CLOCK_FEATURES, LARGEST, Feature, Outlook, 
 from mpc.errors import MpcError, PlantActionError
 from mpc.loop.actuators import Actuator
 from thermal._types import FloatArray
+from thermal.batch.program import Program
+from thermal.batch.trace import Tape, Traced
 from thermal.case.points import split_column
 from thermal.components.operations import Value
 
@@ -28,7 +30,6 @@ HISTOGRAM_EDGES: Mapping[str, tuple[float, ...]] = {
 #: What the paper's agent sets: supply water, and supply air common to the air handlers.
 SUPPLY_SETPOINTS = ("supply_water_temperature_setpoint", "supply_air_temperature_setpoint")
 
-_ROWS = 8  # rows of many plants' measurements that are scaled together
 _LARGEST = 1.0 + 1e-6  # agents compute in single precision
 
 
@@ -91,9 +92,6 @@ class ObservationLayout:
             pairs = [(k, f) for k, f in zip(kept, features, strict=True) if points[k] not in HISTOGRAM_EDGES]
             kept, features = tuple(k for k, _ in pairs), tuple(f for _, f in pairs)
         self._kept = np.array(kept, dtype=np.intp)
-        cuts = np.split(self._kept, np.flatnonzero(np.diff(self._kept) != 1) + 1) if kept else []
-        parts = [part for run in cuts for part in np.split(run, range(_ROWS, len(run), _ROWS))]
-        self._runs = [slice(int(part[0]), int(part[-1]) + 1) for part in parts]
         self._factor, self._offset = scaling(features)
         ahead = () if outlook is None else outlook.features
         self.features: tuple[Feature, ...] = (*features, *counted, *ahead, *CLOCK_FEATURES)
@@ -153,47 +151,67 @@ class ObservationLayout:
             parts.append((np.stack([float(at.size), *beyond]) - np.stack([*beyond, 0.0])) / at.size)
         return np.concatenate(parts)
 
-    def observe_many(self, values: Values, ahead: Values | None, now: Values) -> Observation:
-        """Observe many plants at once.
+    def trace(self, columns: int) -> tuple[Tape, Traced, Traced]:
+        """Note how an observation begins: what `measured` gives, cut at `LARGEST`, and 0 for NaN.
+
+        Parameters
+        ----------
+        columns : int
+            Of the measurements.
+
+        Returns
+        -------
+        tuple
+            The notes, what is set and what results.
+        """
+        tape = Tape()
+        values = tape.value(columns)
+        scaled = self.measured(values)
+        cut = np.maximum(np.minimum(np.where(scaled == scaled, scaled, 0.0), LARGEST), -LARGEST)
+        return tape, values, tape.keep(cut, self.own)
+
+
+class ManyObservations:
+    """Observations of many plants at once, as `ObservationLayout.observe` gives them.
+
+    Parameters
+    ----------
+    layout : ObservationLayout
+        Of each.
+    columns, members : int
+        Of the measurements, and how many plants.
+    dtype : type
+        Of the measurements.
+    compiled : bool
+        As in `thermal.batch.program.Program`.
+    """
+
+    def __init__(self, layout: ObservationLayout, columns: int, members: int, dtype: Any, compiled: bool) -> None:
+        tape, values, own = layout.trace(columns)
+        self._program, self._shape = Program(tape, members, dtype, compiled), (len(layout), members)
+        self._values, self._own = self._program.of(values), self._program.of(own)
+
+    def observe(self, values: Values, ahead: Values, now: Values) -> Observation:
+        """Observe.
 
         Parameters
         ----------
         values : ndarray, shape (n_column, n)
             Measurements, a column a plant [library's units].
-        ahead : ndarray, shape (n_ahead, n or 1), or None
-            Of the outlook, within `LARGEST` of 0 [-].
+        ahead : ndarray, shape (n_ahead, n or 1)
+            Of the outlook, within `LARGEST` of 0 [-]; without rows where there is none.
         now : ndarray, shape (6, n or 1)
             Of `clock` [-].
 
         Returns
         -------
         ndarray of float32, shape (n, n_feature)
-            A row a plant, as `observe` gives it; the transpose of what lies in memory.
+            A row a plant; the transpose of what lies in memory.
         """
-        seen = np.empty((len(self.features), values.shape[1]), dtype=np.float32)
-        measured, counted, forecast = self._ends
-        place, largest = 0, values.dtype.type(LARGEST)
-        factor, offset = (v[:, None].astype(values.dtype) for v in (self._factor, self._offset))
-        for run in self._runs:  # slices, as picking rows would copy them; few rows at a time stay in the cache
-            end = place + run.stop - run.start
-            scaled = seen[place:end] if values.dtype == seen.dtype else np.empty_like(values[run])
-            np.multiply(values[run], factor[place:end], out=scaled)
-            np.add(scaled, offset[place:end], out=scaled)
-            np.minimum(scaled, largest, out=scaled)
-            np.maximum(scaled, -largest, out=seen[place:end], casting="same_kind")
-            place = end
-        begin = measured
-        for at, edges in self._histograms:
-            beyond = [(values[at] >= edge).sum(axis=0) for edge in edges]  # as `searchsorted` counts
-            counts = -np.diff(np.stack([np.full(values.shape[1], at.size), *beyond, np.zeros_like(beyond[0])]), axis=0)
-            seen[begin : begin + len(edges) + 1] = counts / at.size
-            begin += len(edges) + 1
-        own = seen[:measured]
-        if np.isnan(own.sum()):
-            own[np.isnan(own)] = 0.0
-        if ahead is not None:
-            seen[counted:forecast] = ahead
-        seen[forecast:] = now
+        np.copyto(self._values, values)
+        self._program.run()
+        seen, own, forecast = np.empty(self._shape, dtype=np.float32), len(self._own), len(self._own) + len(ahead)
+        seen[:own], seen[own:forecast], seen[forecast:] = self._own, ahead, now
         return seen.T
 
 

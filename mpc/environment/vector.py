@@ -15,7 +15,7 @@ from mpc.batch.inputs import DrivingRows
 from mpc.batch.plant import BatchedPlant, record_of
 from mpc.environment.environment import ControlEnvironment, Course, draw_episode
 from mpc.environment.features import LARGEST, clock
-from mpc.environment.layout import Observation
+from mpc.environment.layout import ManyObservations, Observation
 from mpc.environment.render import RenderedRun
 from mpc.environment.reward import batch_reward
 from mpc.errors import MpcError
@@ -123,6 +123,9 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Observation, NDArray[np.float
             checked_plants(single.plants), num_envs, actions=single.actions.names, dtype=dtype,
             score=given.of_values, compiled=compiled,
         )  # fmt: skip
+        self._observations = ManyObservations(
+            single.layout, len(single.plants[0].columns), num_envs, self.batch.dtype, compiled
+        )
         courses = single.courses
         tables = [seen_rows(course, plant) for course, plant in zip(courses, self.batch.plants, strict=True)]
         self._seen = DrivingRows(tables, num_envs, (), np.float32)
@@ -287,9 +290,8 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Observation, NDArray[np.float
 
     def _observe(self, measured: NDArray[Any]) -> Observation:
         self._seen.fill(self.batch.now, self._look)
-        ahead = self._look[self._seen.parts["ahead"]]
-        now = self._look[self._seen.parts["clock"]]
-        return self.single.layout.observe_many(measured, ahead if len(ahead) else None, now)
+        ahead, now = (self._look[self._seen.parts[part]] for part in ("ahead", "clock"))
+        return self._observations.observe(measured, ahead, now)
 
 
 def seen_rows(course: Course, plant: SimulatedPlant) -> dict[str, FloatArray]:

@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 
 from mpc.errors import PlantError
 from mpc.loop.plant import PointLayout
+from mpc.loop.random_numbers import normal_numbers, stream_key
 from thermal._types import FloatArray
 from thermal.components.operations import Value
 
-_STREAM = 7  # of random numbers of a seed, apart from those of people, forecasts and the shuffle
-BLOCK = 64  # steps whose noise is drawn together
+STREAM = 7  # of random numbers of a seed, apart from those of people, forecasts and the shuffle
+_BLOCK = 64  # steps whose noise is drawn together
 _FREEZING = 273.15  # K: sensors count their resolution from here
 
 
@@ -88,18 +89,6 @@ class NoiseSource:
         """Random numbers of a step."""
         return sum(column.size for column, *_ in self._groups)
 
-    def block(self, number: int, seed: int) -> FloatArray:
-        """Draw the random numbers of `BLOCK` steps, shape (BLOCK, width) [-].
-
-        Parameters
-        ----------
-        number : int
-            Of the block, from 0.
-        seed : int
-            0 or more.
-        """
-        return np.random.default_rng([seed, _STREAM, number]).standard_normal((BLOCK, self.width))
-
     def disturb(self, k: int, values: FloatArray, seed: int) -> FloatArray:
         """Add the noise of a step to its values, which depends on seed and step only.
 
@@ -112,9 +101,11 @@ class NoiseSource:
         seed : int
             0 or more.
         """
-        number, row = divmod(k, BLOCK)
+        number, row = divmod(k, _BLOCK)
         if self._block[0] != (seed, number):
-            self._block = ((seed, number), self.block(number, seed))
+            steps = _BLOCK * number + np.arange(_BLOCK)
+            drawn = normal_numbers(np.full(_BLOCK, stream_key(seed, STREAM)), steps, self.width)
+            self._block = ((seed, number), drawn.T.astype(float))
         self.add(values, self._block[1][row])
         return values
 
