@@ -19,6 +19,7 @@ from calibration.fit.result import Rung
 from calibration.progress import Forward, Progress
 from thermal.case.building import GeometryQuality
 from thermal.effects.catalogue import CATALOGUE
+from thermal.inputs.provider import IRRADIANCE, telemetry_inputs
 from thermal.network.structure import Structure
 
 #: Share by which a free structure must predict left-out days better than the building as drawn with what was found [-].
@@ -28,8 +29,8 @@ from thermal.network.structure import Structure
 FAILS = 0.2
 
 
-#: Name of a gain that recurs.
-GAINS = "internal_gains"
+#: Names of a gain that recurs, and of sun that nobody measures.
+GAINS, SUN = "internal_gains", "solar_gain"
 
 #: What moves the weather: that heat comes late is how floors and boilers are, and a heated floor that lacked nothing
 #: was taken for a clock by that.
@@ -167,8 +168,8 @@ def search_free(
 
     How many independent errors it has is what its calibration found of their correlation. The errors of a building that
     people live in are larger than those of an office whose heat is all metered, so that only what comes back counts as
-    left over. What the structure itself has found and the catalogue has a name for is sought by its name: a gain that
-    recurs from day to day, and weather that is moved by more than a step of the telemetry.
+    left over. What the structure itself has found and the catalogue has a name for is sought by its name: sun that
+    nobody measures, a gain that recurs from day to day, and weather that is moved by more than a step of the telemetry.
 
     Parameters
     ----------
@@ -190,6 +191,8 @@ def search_free(
         attempts.insert(0, (whole, {e: z for e, z in chosen.effects.items() if e != CLOCK}, CLOCK))
     if whole.recurring and GAINS not in said:
         attempts.insert(0, (replace(whole, recurring=False), chosen.effects, GAINS))
+    if whole.sun and SUN not in said and telemetry_inputs(models.case).estimates(IRRADIANCE):
+        attempts.insert(0, (replace(whole, sun=False), chosen.effects, SUN))
     for structure, own, sought in attempts:
         settings = replace(
             models.settings, structure=structure, scopes=chosen.scopes, normalisation=chosen.normalisation

@@ -16,7 +16,7 @@ from calibration.fit.result import CalibrationResult, Rung
 from calibration.progress import Forward, Progress
 from thermal.case.case import Case
 from thermal.case.emitters import Unknown, unknown_heaters
-from thermal.inputs.provider import IRRADIANCE, telemetry_inputs
+from thermal.inputs.provider import telemetry_inputs
 from thermal.model.reduce import reduced_model
 from thermal.network.structure import BASELINE, Structure
 from thermal.parameters import Scope
@@ -118,7 +118,7 @@ def fit_emitter(
         return None
     # a drawing that is wrong altogether is better with anything slow
     source = telemetry_inputs(given.case)
-    lumped = ladder.solve(replace(ladder.base, structure=Structure(lumped=True, sun=source.measured(IRRADIANCE))))
+    lumped = ladder.solve(replace(ladder.base, structure=Structure(lumped=True, sun=source.gives("sun"))))
     wrong = ladder.look("lumped", lumped.best).left.mae < (1.0 - ADVANCE) * best.left.mae
     return None if wrong else best.fit
 
@@ -150,10 +150,10 @@ def climb_from(
 
     With heat that radiates, or that floors give, where the case does not say what heaters give it by; with outside
     films that follow the wind, and with slabs and furniture by zone, unless a lumped model halves the drawing's error;
-    lumped, where the sun is a part of it if irradiance is measured; lumped, with a gain that recurs from day to day,
-    which is linear, so that a few Newton steps from the lumped estimate tell whether it is worth a fit; lumped with
-    floors that are heated, where that alone is better than any drawing; and where one of these is kept, with heat and
-    weather moved in time.
+    lumped, where the sun is a part of it, by an estimate if irradiance is not measured; lumped, with a gain that recurs
+    from day to day, which is linear, so that a few Newton steps from the lumped estimate tell whether it is worth a
+    fit; lumped with floors that are heated, where that alone is better than any drawing; and where one of these is
+    kept, with heat and weather moved in time.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def climb_from(
         best = _best(looked, advance)
         if (found := looked[best].fit) is not None:
             base, fitted = found.settings, found.best
-    structure = Structure(lumped=True, sun=source.measured(IRRADIANCE), emitter=ladder.base.structure.emitter)
+    structure = Structure(lumped=True, sun=source.gives("sun"), emitter=ladder.base.structure.emitter)
     free = ladder.lumped(structure, looked[best].left.mae)
     drawn = free[0].left.mae >= _WRONG * looked[best].left.mae
     if plain and drawn and source.gives("wind"):

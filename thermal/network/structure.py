@@ -99,7 +99,7 @@ class Structure:
     lumped : bool
         Air and one mass a zone, with a multiplier for every conductance and capacity of the drawing.
     sun : bool
-        Of a lumped model: an aperture for the sun a zone and direction, which takes measured irradiance.
+        Of a lumped model: an aperture for the sun a zone and direction.
     recurring : bool
         Of a lumped model: a gain a zone that recurs from day to day, as people and their devices bring it.
     wind_films : bool
