@@ -54,6 +54,8 @@ class Weather:
         True for a year of hours that stands for any year: it repeats, and 29 February is like the day before.
     step : float
         Length of a step [s]; default 0: the time between stamps, which a single row does not tell.
+    estimated : bool
+        True when irradiances are estimated, as nobody measured them.
 
     Raises
     ------
@@ -66,6 +68,7 @@ class Weather:
     readings: bool = False
     typical: bool = False
     step: float = 0.0
+    estimated: bool = False
 
     def __post_init__(self) -> None:
         step = regular_steps(self.frame.index, "weather", WeatherError, self.step, _LONGEST_STEP)

@@ -14,6 +14,7 @@ from thermal.case.building import Location
 from thermal.case.case import Case
 from thermal.case.points import OUTDOOR_TEMPERATURE, POINT_TYPES
 from thermal.errors import CaseError, nearest
+from thermal.inputs.provider import IRRADIANCE, telemetry_inputs
 from thermal.units import QUANTITIES, to_si
 
 _STEFAN_BOLTZMANN = 5.670374419e-8  # W/m2/K4, CODATA 2018
@@ -192,7 +193,7 @@ def _stamps(column: pd.Series, location: Location, path: str | Path) -> pd.Datet
 
 
 def weather_of_case(case: Case, longest_gap: float = 3600.0) -> Weather:
-    """Take the weather that a case's telemetry holds.
+    """Take the weather that a case's telemetry holds; irradiance is estimated where none is measured.
 
     Parameters
     ----------
@@ -222,4 +223,7 @@ def weather_of_case(case: Case, longest_gap: float = 3600.0) -> Weather:
         empty = frame[point].isna()
         length = empty.groupby((~empty).cumsum()).transform("sum")
         frame[point] = filled[point].where(~empty | (length <= steps))
-    return Weather(frame, case.building.location)
+    inputs = telemetry_inputs(case)
+    if estimated := inputs.estimates(IRRADIANCE):  # models have the sun that way, and a forecast is too short to estimate it from
+        frame[SUN_POINTS[0]], frame[SUN_POINTS[1]] = inputs.sun.normal, inputs.sun.diffuse
+    return Weather(frame, case.building.location, estimated=estimated)

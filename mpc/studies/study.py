@@ -236,6 +236,8 @@ def make_study(
 
 def _weather_words(weather: Weather) -> str:
     """Say where weather is from."""
+    if weather.estimated:
+        return "as measured with the case, but for irradiance, which is estimated from each day's range of temperature"
     if not weather.typical:
         return "as measured with the case"
     place = weather.location

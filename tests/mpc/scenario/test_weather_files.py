@@ -17,6 +17,7 @@ from mpc.scenario.grid import StepGrid
 from mpc.scenario.weather_files import read_epw, read_tmy3, read_weather_csv, sky_radiation, weather_of_case
 from thermal import Case, Telemetry, load_bundled_case
 from thermal.case.building import Location
+from thermal.inputs.provider import telemetry_inputs
 
 BAY = Location(latitude=37.4, longitude=-122.1, elevation=20.0, timezone="America/Los_Angeles")
 AIR, WIND, FROM = "outside_air_temperature_sensor", "wind_speed_sensor", "wind_direction_sensor"
@@ -150,6 +151,20 @@ def test_a_case_hands_its_telemetry_on_unchanged() -> None:
     assert np.array_equal(on.outdoor, case.boundary_temperatures()["outdoor"].to_numpy()[100:388])
     beam = case.weather()[BEAM].to_numpy()[100:388]
     assert np.array_equal(on.frame[BEAM].to_numpy()[~np.isnan(beam)], beam[~np.isnan(beam)])
+
+
+def test_irradiance_that_nobody_measures_is_that_of_the_model() -> None:
+    """A window of a day is too short to estimate it from, so that plans and plants take what the telemetry gives."""
+    case = load_bundled_case()
+    frame = case.telemetry.frame
+    frame = frame.drop(columns=frame.filter(regex="irradiance").columns)
+    blind = Case(case.building, Telemetry(frame, case.step, case.telemetry.missing_rows))
+    day = StepGrid(blind.stamps[99], 300.0, 288)
+    assert weather_of_case(blind).estimated and not weather_of_case(case).estimated
+    sun, model = weather_of_case(blind).on(day).sun, telemetry_inputs(blind).sun
+    np.testing.assert_allclose(sun.normal, model.normal[100:388])
+    np.testing.assert_allclose(sun.horizontal, model.horizontal[100:388], atol=1e-9)
+    assert model.horizontal.max() > 100.0
 
 
 def test_short_gaps_of_a_case_are_bridged_and_long_ones_are_not() -> None:
