@@ -224,6 +224,7 @@ def weather_of_case(case: Case, longest_gap: float = 3600.0) -> Weather:
         length = empty.groupby((~empty).cumsum()).transform("sum")
         frame[point] = filled[point].where(~empty | (length <= steps))
     inputs = telemetry_inputs(case)
-    if estimated := inputs.estimates(IRRADIANCE):  # models have the sun that way, and a forecast is too short to estimate it from
+    # models have the sun that way, and a forecast is too short to estimate it from
+    if estimated := inputs.estimates(IRRADIANCE):
         frame[SUN_POINTS[0]], frame[SUN_POINTS[1]] = inputs.sun.normal, inputs.sun.diffuse
     return Weather(frame, case.building.location, estimated=estimated)

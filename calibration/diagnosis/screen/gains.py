@@ -65,7 +65,9 @@ def choice_of(count: int, places: int) -> float:
     Parameters
     ----------
     count, places : int
-        Places chosen, and all there are.
+        Places chosen, and all there are. An effect that is fitted where another was found may be in more than the
+        tangents saw a sign of: these are then all.
     """
+    places = max(places, count)
     number = gammaln(places + 1) - gammaln(count + 1) - gammaln(places - count + 1)
     return float(np.log(2.0) * (1 if count == places else 1 + count) + number)

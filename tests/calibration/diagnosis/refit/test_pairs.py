@@ -290,3 +290,8 @@ def test_what_stood_for_another_effect_is_exchanged_once_the_second_is_in_the_mo
     rounds, made = searched("flow_gain")
     assert _exchanged(models, rounds, made, names) is None
     assert _exchanged(models, rounds[:1], made, names) is None
+
+
+def test_an_effect_in_more_zones_than_the_tangents_saw_is_everywhere() -> None:
+    assert choice_of(5, 4) == choice_of(5, 5) == pytest.approx(np.log(2.0))
+    assert choice_of(2, 4) == pytest.approx(3.0 * np.log(2.0) + np.log(6.0))
