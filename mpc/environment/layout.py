@@ -95,7 +95,7 @@ class ObservationLayout:
         self._factor, self._offset = scaling(features)
         ahead = () if outlook is None else outlook.features
         self.features: tuple[Feature, ...] = (*features, *counted, *ahead, *CLOCK_FEATURES)
-        self._ends = len(features), len(features) + len(counted), len(features) + len(counted) + len(ahead)
+        self._ends = len(features) + len(counted), len(features) + len(counted) + len(ahead)
 
     def __len__(self) -> int:
         return len(self.features)
@@ -103,7 +103,7 @@ class ObservationLayout:
     @property
     def own(self) -> int:
         """Entries of measurements and histograms, which come first."""
-        return self._ends[1]
+        return self._ends[0]
 
     def observe(self, values: FloatArray, ahead: FloatArray | None, now: FloatArray) -> Observation:
         """Observe.
@@ -123,7 +123,7 @@ class ObservationLayout:
             Within `LARGEST` of 0 [-].
         """
         seen = np.empty(len(self.features), dtype=np.float32)
-        _, counted, forecast = self._ends
+        counted, forecast = self._ends
         seen[:counted] = self.measured(values)
         if ahead is not None:
             seen[counted:forecast] = ahead
