@@ -211,8 +211,10 @@ def climb_from(
     kept = looked[best]
     if kept.fit is not None and kept.fit.settings.structure.lumped and not kept.fit.settings.effects:
         moved = replace(kept.fit.settings, effects={CLOCK: ()})
-        looked.append(ladder.tried("shifted", moved, kept.fit.best, _MOVED, kept.left.mae, anew=False))
-        kept = kept if looked[-1].fit is None else looked[-1]
+        # fitted at once: Newton steps from heat that is not moved at all tell nothing of half an hour
+        shifted = ladder.solve(moved, kept.fit.best)
+        looked.append(ladder.look("shifted", shifted.best, shifted))
+        kept = looked[-1] if looked[-1].left.mae < (1.0 - _MOVED) * kept.left.mae else kept
     rungs = tuple(Rung(each.name, each.left.mae, each.parameters, each is kept) for each in looked)
     return rungs, None if kept.fit is None else replace(kept.fit, left=kept.left), kept.left
 
@@ -265,9 +267,7 @@ class _Ladder:
         case = self.given.case
         return self.base.structure.emitter == "air" and bool(unknown_heaters(case.building, case.telemetry.frame))
 
-    def tried(
-        self, name: str, settings: CalibrationSettings, known: Fitted, least: float, error: float, *, anew: bool = True
-    ) -> _Looked:
+    def tried(self, name: str, settings: CalibrationSettings, known: Fitted, least: float, error: float) -> _Looked:
         """Look at a structure as it begins, and fit it where that promises to be better by a share.
 
         Where heat goes elsewhere what is known of other parameters is wrong, so such a fit begins anew: from the
@@ -276,7 +276,7 @@ class _Ladder:
         seen = self.look(name, _begun(self.given, settings, known))
         if not seen.left.mae < (1.0 - least) * error:  # nor where days are too few to leave any out
             return seen
-        found = self.solve(settings, None if anew else known)
+        found = self.solve(settings)
         return self.look(name, found.best, found)
 
     def emitters(self, fitted: Fitted, error: float) -> list[_Looked]:
