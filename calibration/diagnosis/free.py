@@ -19,7 +19,7 @@ from calibration.fit.result import Rung
 from calibration.progress import Forward, Progress
 from thermal.case.building import GeometryQuality
 from thermal.effects.catalogue import CATALOGUE
-from thermal.inputs.provider import IRRADIANCE, telemetry_inputs
+from thermal.inputs.provider import IRRADIANCE
 from thermal.network.structure import Structure
 
 #: Share by which a free structure must predict left-out days better than the building as drawn with what was found [-].
@@ -191,7 +191,7 @@ def search_free(
         attempts.insert(0, (whole, {e: z for e, z in chosen.effects.items() if e != CLOCK}, CLOCK))
     if whole.recurring and GAINS not in said:
         attempts.insert(0, (replace(whole, recurring=False), chosen.effects, GAINS))
-    if whole.sun and SUN not in said and telemetry_inputs(models.case).estimates(IRRADIANCE):
+    if whole.sun and SUN not in said and models.drivers.estimates(IRRADIANCE):
         attempts.insert(0, (replace(whole, sun=False), chosen.effects, SUN))
     for structure, own, sought in attempts:
         settings = replace(
