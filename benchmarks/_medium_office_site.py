@@ -19,7 +19,7 @@ from typing import Any, ClassVar
 import pandas as pd
 from _energyplus_control import COMFORT_PRICE, optimal
 from _energyplus_offices import CONTROL_STEPS, HORIZON, OFFICES, STEP, Office, prepared
-from _modelled_office import ModelledOffice, modelled_building
+from _modelled_office import modelled_building, modelled_office
 from _site import POLICIES, Site, Week, World
 
 from mpc.adapters.energyplus.building import energyplus_building
@@ -29,6 +29,7 @@ from mpc.baselines.rules import OutdoorReset
 from mpc.environment.environment import ScenarioPlant
 from mpc.loop.plant import Controller
 from mpc.loop.run import FixedSetpoints
+from mpc.loop.view import ViewedPlant
 from mpc.model import control_model
 from thermal.effects.catalogue import chosen
 from thermal.model.reduce import ReducedModel
@@ -79,15 +80,29 @@ class MediumOfficeSite(Site):
         """Length of the weeks [d]."""
         return self.length
 
-    def plant(self, week: Week, world: World = "plant", *, bound: bool = False) -> EnergyPlusPlant | ModelledOffice:
+    def plant(self, week: Week, world: World = "plant", *, bound: bool = False) -> Any:
         """Make the plant of a week: EnergyPlus, or the model of the season in its place."""
         if bound:
             raise ValueError("expected no bound: nobody knows EnergyPlus' state")
+        if world != "plant":
+            return self.modelled(week, world=world)
         days = _FORTNIGHT if week in self.training_weeks.values() else self.length
-        plant = _SUMMER.plant(week[0], days, HORIZON, week[1])
-        if world == "plant":
-            return plant
-        return ModelledOffice(plant, known_model(season_of(plant), world))
+        return _SUMMER.plant(week[0], days, HORIZON, week[1])
+
+    def modelled(self, week: Week, season: str | None = None, world: World = "after") -> ViewedPlant:
+        """Put a model in EnergyPlus' place.
+
+        Parameters
+        ----------
+        week : tuple of str and int
+            First day and seed.
+        season : str, optional
+            Of its telemetry; the nearest by default.
+        world : str
+            ``before`` or ``after`` its diagnosis.
+        """
+        plant = self.plant(week)
+        return modelled_office(plant, known_model(season or season_of(plant), world))
 
     def controller(self, name: str, price: float, plant: ScenarioPlant) -> Controller:
         """Make a controller that does not learn."""

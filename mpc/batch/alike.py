@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from mpc.errors import PlantError
+from mpc.loop.building import BuildingModel
 from mpc.loop.reduced import ReducedBuilding
 from mpc.loop.simulated import SimulatedPlant
 from thermal._types import IntArray
@@ -27,11 +28,24 @@ def different_models(models: Sequence[ReducedBuilding]) -> tuple[list[ReducedBui
     found, place = list[ReducedBuilding](), list[int]()
     for model in models:
         mine = model.step_matrices()
-        same = [k for k, other in enumerate(found) if other is model or
-                all(np.array_equal(a, b) for a, b in zip(mine, other.step_matrices(), strict=True))]  # fmt: skip
+        same = [k for k, other in enumerate(found) if other is model or (driven_by(other) == driven_by(model) and
+                all(np.array_equal(a, b) for a, b in zip(mine, other.step_matrices(), strict=True)))]  # fmt: skip
         place.append(same[0] if same else len(found))
         found += [] if same else [model]
     return found, np.array(place, dtype=np.intp)
+
+
+def driven_by(*models: BuildingModel) -> tuple[str, ...]:
+    """Name what drives buildings from outside, each boundary and signal that one of them has once; in their order.
+
+    Parameters
+    ----------
+    *models : BuildingModel
+        Whose effects may differ.
+    """
+    boundaries = dict.fromkeys(f"boundary {name}" for model in models for name in model.network.boundaries)
+    signals = dict.fromkeys(f"signal {signal.name}" for model in models for signal in model.network.signals)
+    return (*boundaries, *signals)
 
 
 def checked_plants(plants: Any) -> tuple[SimulatedPlant, ...]:
@@ -59,8 +73,6 @@ def checked_plants(plants: Any) -> tuple[SimulatedPlant, ...]:
             PlantError.unless(same, where, f"the same {what.replace('_', ' ')} as plant 0", "others")
         same = same_system(plant.system, first.system) and plant.scenario.grid.step == first.scenario.grid.step
         PlantError.unless(same, where, "the HVAC system and step of plant 0", "others")
-        signals = [[s.name for s in p.model.network.signals] for p in (plant, first)]
-        PlantError.unless(signals[0] == signals[1], where, "the signals of effects of plant 0", "others")
         noise = [None if p.sensors.noise is None else p.sensors.noise.noise for p in (plant, first)]
         PlantError.unless(noise[0] == noise[1], where, "the noise of plant 0", "another")
     return every

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from mpc.batch.alike import driven_by
 from mpc.loop.reduced import ReducedBuilding
 from thermal._types import FloatArray, IntArray
 from thermal.batch.trace import Tape, Traced
@@ -37,7 +38,7 @@ class StepMatrices(NamedTuple):
     moving: Any
 
     @classmethod
-    def of(cls, model: ReducedBuilding, order: int) -> "StepMatrices":
+    def of(cls, model: ReducedBuilding, order: int, outside: Sequence[str]) -> "StepMatrices":
         """Take those of a building; one of fewer modes gets some that stay at zero.
 
         Parameters
@@ -46,9 +47,12 @@ class StepMatrices(NamedTuple):
             The building.
         order : int
             Number of modes.
+        outside : sequence of str
+            Of `driven_by`: what drives this building or another one; what is another's has no effect here.
         """
-        end, driving, heating, output, response = model.step_matrices()
-        more = order - end.size
+        end, own, heating, output, response = model.step_matrices()
+        more, driving = order - end.size, np.zeros((end.size, len(outside)))
+        driving[:, [outside.index(name) for name in driven_by(model)]] = own
         moving = np.pad(np.hstack([heating, driving]), ((0, more), (0, 0)))
         left = np.pad(output * end, ((0, 0), (0, more)))
         return cls(left, output @ driving, response, np.pad(end, (0, more)), moving)
@@ -60,7 +64,7 @@ class BatchedBuilding:
     Parameters
     ----------
     models : sequence of ReducedBuilding
-        Different ones, of the same zones, boundaries and signals; members may have the same.
+        Different ones, of the same zones; members may have the same. Their effects may differ.
 
     Notes
     -----
@@ -71,7 +75,9 @@ class BatchedBuilding:
     def __init__(self, models: Sequence[ReducedBuilding]) -> None:
         #: Number of modes.
         self.order = max(model.order for model in models)
-        self._all = [StepMatrices.of(model, self.order) for model in models]
+        #: What drives them from outside, as `driven_by` names it.
+        self.outside = driven_by(*models)
+        self._all = [StepMatrices.of(model, self.order, self.outside) for model in models]
 
     @property
     def shared(self) -> bool:

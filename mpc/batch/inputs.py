@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from mpc.batch.alike import driven_by
 from mpc.batch.building import Array
 from mpc.loop.noise import STREAM
 from mpc.loop.random_numbers import compiled_filling, normal_numbers, stream_key
@@ -16,13 +17,15 @@ from thermal.units import REFERENCE_TEMPERATURE
 _TOGETHER, _LONGEST = 4096, 64
 
 
-def plant_rows(plant: SimulatedPlant) -> dict[str, FloatArray]:
+def plant_rows(plant: SimulatedPlant, outside: Sequence[str]) -> dict[str, FloatArray]:
     """Lay out what drives a plant, a row a step; temperatures of zones are counted from the reference temperature.
 
     Parameters
     ----------
     plant : SimulatedPlant
         The plant.
+    outside : sequence of str
+        Of `mpc.batch.alike.driven_by`: what drives the building of this plant or of another one.
     """
     scenario, operation, n = plant.scenario, plant.operation, plant.scenario.grid.n_steps
     prices = [getattr(scenario, f"{of}_{kind}") for kind in ("price", "carbon") for of in ("electricity", "gas")]
@@ -38,11 +41,11 @@ def plant_rows(plant: SimulatedPlant) -> dict[str, FloatArray]:
         "lower": scenario.lower - REFERENCE_TEMPERATURE,
         "upper": scenario.upper - REFERENCE_TEMPERATURE,
         "prices": np.column_stack(prices),
-        **people_rows(plant, plant.scenario),
+        **people_rows(plant, plant.scenario, outside),
     }
 
 
-def people_rows(plant: SimulatedPlant, scenario: Any) -> dict[str, FloatArray]:
+def people_rows(plant: SimulatedPlant, scenario: Any, outside: Sequence[str]) -> dict[str, FloatArray]:
     """Lay out what depends on who is in: people, their heat, and signals of effects.
 
     Parameters
@@ -51,10 +54,14 @@ def people_rows(plant: SimulatedPlant, scenario: Any) -> dict[str, FloatArray]:
         The plant.
     scenario : Scenario
         Its own, or with other people.
+    outside : sequence of str
+        As in `plant_rows`; what this building does not have stays at 0.
     """
-    outside = plant.outside(scenario) - np.append(np.full(len(plant.model.network.boundaries), REFERENCE_TEMPERATURE),
-                                                  np.zeros(len(plant.model.network.signals)))  # fmt: skip
-    return {"gains": scenario.gains, "people": scenario.occupancy, "outside": outside}
+    own, network = plant.outside(scenario), plant.model.network
+    own -= np.repeat([REFERENCE_TEMPERATURE, 0.0], [len(network.boundaries), len(network.signals)])
+    whole = np.zeros((len(own), len(outside)))
+    whole[:, [outside.index(name) for name in driven_by(plant.model)]] = own
+    return {"gains": scenario.gains, "people": scenario.occupancy, "outside": whole}
 
 
 class DrivingRows:

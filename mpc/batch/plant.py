@@ -83,8 +83,9 @@ class BatchedPlant:
         )
         models, self._model_of = different_models([p.model for p in self.plants])  # type: ignore[misc]
         own = ("gains", "people", "outside") if self._random_people else ()
-        self._rows = DrivingRows([plant_rows(p) for p in self.plants], members, own, dtype)
         self._building = BatchedBuilding(models)
+        driving = [plant_rows(p, self._building.outside) for p in self.plants]
+        self._rows = DrivingRows(driving, members, own, dtype)
         #: The step that was traced.
         self.traced = TracedStep(
             first, self._rows.parts, self._rows.width, self._rows.each, self.actions, self._building, score,
@@ -235,7 +236,8 @@ class BatchedPlant:
         for member in index:
             seed = int(self.seeds[member])
             scenario = plant.given.redrawn(seed) if self._random_people else plant.given
-            self._rows.begin(member, number, people_rows(plant, scenario) if self._random_people else None)
+            own = people_rows(plant, scenario, self._building.outside) if self._random_people else None
+            self._rows.begin(member, number, own)
             if self._noise is not None:
                 self._noise.begin(member, seed)
             self.measured[:, member] = plant.sensors.read(last, scenario.occupancy[last.number], seed)

@@ -100,7 +100,7 @@ class FunctionalEnvironment:
             batch.traced.tape, [given.row, given.actions, given.noise, *carried],
             [done.measured, done.reward, *carried], batch.dtype,
         )  # fmt: skip
-        tape, seen, scaled = layout.trace(len(worlds.single.plants[0].columns))
+        tape, seen, scaled = layout.trace(len(batch.plants[0].columns), worlds.view)
         self._scaled = FunctionalProgram(tape, [seen], [scaled], batch.dtype)
         worlds.reset(seed=seed)
         members = worlds.num_envs
@@ -112,8 +112,8 @@ class FunctionalEnvironment:
         #: Length of an action.
         self.actions = len(worlds.single.actions)
         ends = np.eye(self.actions) * 2.0 - 1.0
-        self._lowest = worlds.single.actions.setpoints_of_many(-np.ones_like(ends[:1])).astype(batch.dtype)
-        self._spans = worlds.single.actions.setpoints_of_many(ends).astype(batch.dtype) - self._lowest
+        self._lowest = worlds.setpoints(-np.ones_like(ends[:1])).astype(batch.dtype)
+        self._spans = worlds.setpoints(ends).astype(batch.dtype) - self._lowest
         self._noise, self._each, self._of_mean = len(given.noise), worlds.each, worlds.reward_of_mean
 
     def with_tables(self, tables: Tables) -> "FunctionalEnvironment":

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from mpc.environment.features import CLOCK_FEATURES, LARGEST, Feature, Outlook, measured_features, scaling
 from mpc.errors import MpcError, PlantActionError
 from mpc.loop.actuators import Actuator
+from mpc.loop.view import PointView
 from thermal._types import FloatArray
 from thermal.batch.program import Program
 from thermal.batch.trace import Tape, Traced
@@ -151,13 +152,15 @@ class ObservationLayout:
             parts.append((np.stack([float(at.size), *beyond]) - np.stack([*beyond, 0.0])) / at.size)
         return np.concatenate(parts)
 
-    def trace(self, columns: int) -> tuple[Tape, Traced, Traced]:
+    def trace(self, columns: int, view: PointView | None = None) -> tuple[Tape, Traced, Traced]:
         """Note how an observation begins: what `measured` gives, cut at `LARGEST`, and 0 for NaN.
 
         Parameters
         ----------
         columns : int
             Of the measurements.
+        view : PointView, optional
+            What the plant is seen through.
 
         Returns
         -------
@@ -166,7 +169,7 @@ class ObservationLayout:
         """
         tape = Tape()
         values = tape.value(columns)
-        scaled = self.measured(values)
+        scaled = self.measured(values if view is None else view.of(values))
         cut = np.maximum(np.minimum(np.where(scaled == scaled, scaled, 0.0), LARGEST), -LARGEST)
         return tape, values, tape.keep(cut, self.own)
 
@@ -184,10 +187,15 @@ class ManyObservations:
         Of the measurements.
     compiled : bool
         As in `thermal.batch.program.Program`.
+    view : PointView, optional
+        What the plants are seen through.
     """
 
-    def __init__(self, layout: ObservationLayout, columns: int, members: int, dtype: Any, compiled: bool) -> None:
-        tape, values, own = layout.trace(columns)
+    def __init__(
+        self, layout: ObservationLayout, columns: int, members: int, dtype: Any, compiled: bool,
+        view: PointView | None = None,
+    ) -> None:  # fmt: skip
+        tape, values, own = layout.trace(columns, view)
         self._program, self._shape = Program(tape, members, dtype, compiled), (len(layout), members)
         self._values, self._own = self._program.of(values), self._program.of(own)
 

@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from mpc.batch.alike import checked_plants
 from mpc.batch.inputs import DrivingRows
@@ -21,6 +21,7 @@ from mpc.environment.reward import batch_reward
 from mpc.errors import MpcError
 from mpc.kpi.kpis import measure_kpis
 from mpc.loop.simulated import SimulatedPlant
+from mpc.loop.view import seen_through
 from thermal._types import FloatArray
 
 Infos = dict[str, Any]
@@ -71,7 +72,8 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Observation, NDArray[np.float
     Parameters
     ----------
     single : ControlEnvironment
-        What a member is; its plants are on reduced buildings, and may differ in what `BatchedPlant` says.
+        What a member is; its plants are on reduced buildings, and may differ in what `BatchedPlant` says. They may be
+        seen through other points (`mpc.loop.view`).
     num_envs : int
         How many.
     autoreset_mode : gymnasium.vector.AutoresetMode
@@ -118,13 +120,16 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Observation, NDArray[np.float
         self.observation_space = batch_space(single.observation_space, num_envs)
         #: Whether a control step counts as the mean of the plant's steps.
         self.reward_of_mean = bool(given.of_mean)
-        #: The plants, stepped together.
+        #: The plants, stepped together, and what they are seen through.
+        stepped, self.view = seen_through(single.plants)
+        held = {} if self.view is None else self.view.held
+        self._held = np.array([[value] for value in held.values()]).reshape(-1, 1)
         self.batch = BatchedPlant(
-            checked_plants(single.plants), num_envs, actions=single.actions.names, dtype=dtype,
+            checked_plants(stepped), num_envs, actions=(*single.actions.names, *held), dtype=dtype,
             score=given.of_values, compiled=compiled,
         )  # fmt: skip
         self._observations = ManyObservations(
-            single.layout, len(single.plants[0].columns), num_envs, self.batch.dtype, compiled
+            single.layout, len(stepped[0].columns), num_envs, self.batch.dtype, compiled, self.view
         )
         courses = single.courses
         tables = [seen_rows(course, plant) for course, plant in zip(courses, self.batch.plants, strict=True)]
@@ -149,6 +154,18 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Observation, NDArray[np.float
     def action_names(self) -> tuple[str, ...]:
         """Names of the entries of an action."""
         return self.single.action_names
+
+    def setpoints(self, actions: ArrayLike) -> NDArray[np.float64]:
+        """Give what actions set, shape (n_actuator, n) [K or Pa], as `BatchedPlant.step` takes it.
+
+        Parameters
+        ----------
+        actions : ndarray, shape (n, n_action)
+            From -1 to 1 [-].
+        """
+        acted = self.single.actions.setpoints_of_many(actions)
+        held = np.broadcast_to(self._held, (len(self._held), acted.shape[1]))
+        return np.concatenate([acted, held]) if len(held) else acted
 
     def rows(self) -> NDArray[Any]:
         """Give forecasts and clock as they are observed, shape (n_steps, width, member or 1)."""
@@ -243,7 +260,7 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Observation, NDArray[np.float
 
     def _advance(self, actions: NDArray[np.float32]) -> tuple[NDArray[Any], NDArray[Any]]:
         """Step the plants through a control step; give rewards and mean measurements."""
-        setpoints, batch = self.single.actions.setpoints_of_many(actions), self.batch
+        setpoints, batch = self.setpoints(actions), self.batch
         measured, rewards = batch.step(setpoints, self._ended), batch.rewards.astype(float)
         if self.each > 1:
             measured = measured.copy()

@@ -156,10 +156,11 @@ class LocalControl:
         self, heating: FloatArray, cooling: FloatArray, supply: tuple[float, ...], reach: tuple[float, ...]
     ) -> None:
         """Tabulate which end temperature belongs to which free temperature."""
-        begin, end, offset, slope = self.segments(heating, cooling, np.array(supply), np.array(reach))
-        self._start = end[:-1].copy()
-        # the outer lines go on for ever
-        begin[0], end[-1] = -_ENDLESS, _ENDLESS
+        _, end, offset, slope = self.segments(heating, cooling, np.array(supply), np.array(reach))
+        # points fall where more air warms a zone that is too warm: the last line that is reached counts, as in `rest`
+        self._start = np.minimum.accumulate(end[-2::-1])[::-1]
+        endless = np.full((1, len(slope[0])), _ENDLESS)  # the outer lines go on for ever
+        begin, end = np.concatenate([-endless, self._start]), np.concatenate([self._start, endless])
         self._table = np.stack([t.ravel() for t in (begin, end, offset, slope)])
 
     def segments(

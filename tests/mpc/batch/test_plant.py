@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mpc.batch.alike import driven_by
 from mpc.batch.inputs import plant_rows
 from mpc.batch.plant import BatchedPlant
 from mpc.errors import PlantActionError, PlantError
@@ -100,6 +101,21 @@ def test_members_differ_in_weather_people_and_building() -> None:
     assert np.abs(zone[:, 0] - zone[:, 2]).max() > 0.1 and np.abs(zone[:, 0] - zone[:, 3]).max() > 1e-3
 
 
+def test_members_differ_in_what_was_found() -> None:
+    """Each has the effects of its own building, in an order of its own; the others' have no part in it."""
+    found = [], ["solar_gain"], ["ground_exchange", "solar_gain"]
+    given = {"solar_heat_gain_coefficient": 0.5}, {"ground_u_value": 0.6}
+    values = [{}, given[0], given[0] | given[1]]
+    plants = [plant_of("2023-04-10", 2, effects=chosen(names), parameters=v) for names, v in zip(found, values, strict=True)]
+    batch = BatchedPlant(plants, 3, dtype=np.float64)
+    assert follow(batch, [0, 1, 2], [3, 4, 5], 300) <= EXACT
+    batch.reset([3, 3, 3], [0, 1, 2])
+    for row in setpoints(plants[0], 200, 1):
+        batch.step(np.repeat(row, 3, axis=1))
+    zone = batch.zone_temperature
+    assert min(np.abs(zone[:, a] - zone[:, b]).max() for a, b in ((0, 1), (1, 2), (0, 2))) > 1e-3
+
+
 def test_members_may_start_anew_alone() -> None:
     plants = [plant_of("2023-01-09", 1), plant_of("2023-07-10", 1)]
     batch, rows = BatchedPlant(plants, 2, dtype=np.float64), setpoints(plants[0], 40, 2)
@@ -161,7 +177,7 @@ def test_members_start_from_a_state_with_inputs_of_their_own() -> None:
     for row in rows[:24]:
         plant.step(dict(zip([a.name for a in plant.actuators if a.required], row[:, 0].tolist(), strict=True)))
     state, water = plant.model.modal_state, plant.loop.save().hvac.values[0]  # type: ignore[attr-defined]
-    inputs = {name: values[24:60] for name, values in plant_rows(plant).items()}
+    inputs = {name: values[24:60] for name, values in plant_rows(plant, driven_by(plant.model)).items()}
     batch = BatchedPlant(plant, 2, dtype=np.float64)
     batch.start(state, inputs, {"supply_water_temperature": water})
     np.testing.assert_allclose(batch.zone_temperature[:, 0], plant.record().zone_temperature[-1], atol=EXACT)

@@ -62,6 +62,17 @@ def test_a_zone_that_moves_along_its_line_rests_where_a_fresh_look_finds_it(syst
         )
 
 
+def test_where_more_air_warms_a_zone_that_is_too_warm_all_steppers_agree(system: HvacSystem) -> None:
+    """Points of the lines fall there: what is looked up, what is kept, and what a batch goes through are one."""
+    n, rng = system.zone_count, np.random.default_rng(2)
+    low, high, supply = np.full(n, 294.0), np.full(n, 297.0), (303.0, 303.0)
+    control = LocalControl(system, np.full(n, 5e-2))
+    lines = control.segments(low, high, np.array(supply), np.array(REACH))
+    assert (np.diff(lines[1], axis=0) < 0.0).any()
+    for free in rng.uniform(280.0, 310.0, (200, n)):
+        np.testing.assert_array_equal(control.settle(free, low, high, supply, REACH), control.rest(free, lines))
+
+
 def test_without_fans_nothing_moves(system: HvacSystem) -> None:
     n = system.zone_count
     control = LocalControl(system, np.full(n, 1e-3))
