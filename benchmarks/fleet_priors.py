@@ -13,8 +13,8 @@ that of such a fleet, and would be smaller where buildings are less alike; the l
 endless fleet would teach) bounds it. Buildings come from the model that is fitted: nothing here is said of missing
 physics.
 
-Run: ``python benchmarks/fleet_priors.py --out results/priors [--train 100 --test 100] [--publish]``. Writes
-``fleet_priors.json`` and ``.md``.
+Run: ``python benchmarks/fleet_priors.py --out results/priors [--train 100 --test 100] [--workers 2] [--publish]``.
+Writes ``fleet_priors.json`` and ``.md``.
 """
 
 from __future__ import annotations
@@ -22,8 +22,9 @@ from __future__ import annotations
 import argparse
 import os
 import tempfile
-import time
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import replace
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -64,14 +65,14 @@ def shortened(case: Case, since: pd.Timestamp) -> Case:
     return replace(case, telemetry=replace(case.telemetry, frame=case.telemetry.frame.loc[since:]))
 
 
-def train(folder: Path, count: int) -> tuple[dict[str, Population], int]:
+def train(folder: Path, count: int, workers: int) -> tuple[dict[str, Population], int]:
     """Calibrate the training fleet and learn its population by each objective; also how many did not make it."""
     for seed in range(count):
         make_office(folder / "cases" / f"office_{seed:05d}", seed, LONG + HELD_OUT)
     cases, learned, failed = case_folders(folder / "cases"), dict[str, Population](), 0
     for objective in OBJECTIVES:
         out = folder / objective
-        found = calibrate_many(cases, out, SETTINGS | {"objective": objective}, workers=1)
+        found = calibrate_many(cases, out, SETTINGS | {"objective": objective}, workers=workers)
         failed += sum(o.status != "calibrated" for o in found)
         learned[objective] = population_of(LocalFolder(out))
     return learned, failed
@@ -133,20 +134,26 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True, help="folder of the results")
     parser.add_argument("--train", type=int, default=100, help="buildings to learn from")
     parser.add_argument("--test", type=int, default=100, help="buildings to judge on")
+    parser.add_argument("--workers", type=int, default=1, help="processes")
     parser.add_argument("--publish", action="store_true", help="replace the table between its marks")
     options = parser.parse_args()
-    began, load = time.process_time(), os.getloadavg()[0]
+    load, judged = os.getloadavg()[0], list[dict[str, Any]]()
     with tempfile.TemporaryDirectory() as folder:
-        learned, failed = train(Path(folder) / "train", options.train)
-        judged = []
-        for seed in range(FIRST_TEST, FIRST_TEST + options.test):
-            judged.append(judge(Path(folder) / f"office_{seed}", seed, learned))
-            print(f"{len(judged)} of {options.test}, {time.process_time() - began:.0f} s of CPU", flush=True)
-            print(markdown(COLUMNS, rows(judged)), flush=True)
+        learned, failed = train(Path(folder) / "train", options.train, options.workers)
+        began = sum(os.times()[:4])  # with processes that have ended
+        with ProcessPoolExecutor(options.workers, get_context("spawn")) as pool:
+            seeds = range(FIRST_TEST, FIRST_TEST + options.test)
+            asked = [pool.submit(judge, Path(folder) / f"office_{seed}", seed, learned) for seed in seeds]
+            for one in as_completed(asked):
+                judged.append(one.result())
+                print(f"{len(judged)} of {options.test}", flush=True)
+                print(markdown(COLUMNS, rows(judged)), flush=True)
+        judged.sort(key=lambda errors: errors["seed"])
+        seconds = sum(os.times()[:4]) - began
     table = markdown(COLUMNS, rows(judged))
     note = (
         f"{options.train} buildings to learn from ({failed} calibrations without convergence), {options.test} others "
-        f"to judge on; MAE 6 h ahead on the same 7 days. {time.process_time() - began:.0f} s of CPU for the tests.\n"
+        f"to judge on; MAE 6 h ahead on the same 7 days. {seconds:.0f} s of CPU for the tests.\n"
     )
     told = {objective: population.to_dict() for objective, population in learned.items()}
     data = {"judged": judged, "population": told, "failed": failed, "load": load}

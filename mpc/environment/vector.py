@@ -120,10 +120,12 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Observation, NDArray[np.float
         self.observation_space = batch_space(single.observation_space, num_envs)
         #: Whether a control step counts as the mean of the plant's steps.
         self.reward_of_mean = bool(given.of_mean)
-        #: The plants, stepped together, and what they are seen through.
-        stepped, self.view = seen_through(single.plants)
-        held = {} if self.view is None else self.view.held
-        self._held = np.array([[value] for value in held.values()]).reshape(-1, 1)
+        stepped, view = seen_through(single.plants)
+        held = {} if view is None else view.held
+        self._held = np.array(list(held.values()), dtype=float)[:, None]
+        #: What the plants are seen through; None where by points of their own.
+        self.view = view
+        #: The plants, stepped together.
         self.batch = BatchedPlant(
             checked_plants(stepped), num_envs, actions=(*single.actions.names, *held), dtype=dtype,
             score=given.of_values, compiled=compiled,
