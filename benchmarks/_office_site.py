@@ -134,6 +134,11 @@ def model_file(world: World) -> Path:
     return POLICIES / "office" / f"model_{world}_diagnosis.json"
 
 
+def posterior_file() -> Path:
+    """Where the models are that the diagnosis leaves possible."""
+    return POLICIES / "office" / "posterior.json"
+
+
 @dataclass(frozen=True)
 class OfficeSite(Site):
     """The office, whole or small.
@@ -224,6 +229,7 @@ class OfficeSite(Site):
         model_file("before").write_text(json.dumps(baseline.to_dict(), indent=1) + "\n", encoding="utf-8")
         write_diagnosis(diagnose(case, dx=DX), case, work / self.key, force=True)
         shutil.copyfile(work / self.key / "calibration.json", model_file("after"))
+        shutil.copyfile(work / self.key / "posterior.json", posterior_file())
 
     def peer(self, name: str, price: float, plant: SimulatedPlant, hours: float = PEER_HOURS) -> MpcController:
         """Make optimal control with do-mpc as its solver, or with ours on the same problem."""

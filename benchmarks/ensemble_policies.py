@@ -5,9 +5,10 @@ Worlds that PPO is trained in, with the same recipe and steps, on as many plants
 
 - ``before``: the calibrated baseline, which lacks sun and leakage, or sun and the heat of people;
 - ``after``: the model of the diagnosis, at its most likely parameters; of EnergyPlus the one of the nearest season;
-- ``ensemble``: in the office models drawn from the posterior of the diagnosis, parameters and strengths of effects by
-  their standard errors on the estimation scale; of EnergyPlus the diagnoses of three telemetries, which differ by more
-  than their standard errors, and in what they found. Each training week has one of them;
+- ``ensemble``: in the office models that the diagnosis leaves possible, sets of effects by their probability and
+  parameters by their covariance, with the heat that the likeliest leaves unexplained; of EnergyPlus the diagnoses of
+  three telemetries, which differ by more than their standard errors, and in what they found. Each training week has one
+  of them;
 - ``plant``: the office itself, which nobody has to learn from. On EnergyPlus, which has no equations to trace, are the
   policies of `train_rl`, which learned there one step after the other.
 
@@ -23,6 +24,7 @@ from __future__ import annotations
 import argparse
 import json
 import time
+from dataclasses import replace
 from functools import cache
 from itertools import product
 from pathlib import Path
@@ -31,13 +33,14 @@ from typing import Any
 import numpy as np
 from _comparison import Entry, run
 from _medium_office_site import SEASONS, MediumOfficeSite
-from _office_site import STEP, WARM_UP_DAYS, model_file, office
+from _office_site import STEP, WARM_UP_DAYS, office, posterior_file
 from _site import Site
 from _sites import SITES
 from _table import markdown, write
 from simulator_speed import use_one_thread
 
-from calibration.evaluation.settings import ModelSettings, load_parameters, read_settings
+from calibration.diagnosis.posterior import read_posterior
+from calibration.estimation.disturbance import DisturbanceModel
 from mpc.environment.policy import ActorNetwork
 from mpc.loop.noise import SensorNoise
 from mpc.loop.reduced import ReducedBuilding
@@ -52,22 +55,13 @@ BESIDE = {"ppo_plant": "EnergyPlus, PPO of `train_rl`", "sac_plant": "EnergyPlus
 
 
 @cache
-def drawn_models(count: int = MODELS) -> list[ReducedBuilding]:
-    """Draw models from the posterior of the diagnosis."""
-    file = model_file("after")
-    settings = ModelSettings(**read_settings(file))
-    network, told = settings.network(office()), json.loads(file.read_text(encoding="utf-8"))["parameters"]
-    likely, rng = load_parameters(file, network), np.random.default_rng(0)
-    found = []
-    for _ in range(count):
-        values = {}
-        for p, value in zip(network.parameters, likely, strict=True):
-            error = told[p.name]["standard_error"] or 0.0
-            deviation = min(error / p.slope(float(value)), p.prior_deviation)
-            drawn = p.inverse(p.transform(float(value)) + deviation * rng.standard_normal())
-            values[p.name] = float(np.clip(drawn, p.lower, p.upper))
-        found.append(ReducedBuilding(reduced(settings, office(), values), step_seconds=STEP))
-    return found
+def drawn_models(count: int = MODELS) -> list[tuple[ReducedBuilding, DisturbanceModel | None]]:
+    """Draw models that the diagnosis leaves possible, with the heat that they leave unexplained."""
+    drawn = read_posterior(posterior_file()).draw(office(), count)
+    return [
+        (ReducedBuilding(reduced(one.settings, office(), one.values), step_seconds=STEP), one.disturbance)
+        for one in drawn
+    ]
 
 
 def plants_of(site: Site, world: str) -> list[Any]:
@@ -81,8 +75,9 @@ def plants_of(site: Site, world: str) -> list[Any]:
     made = []
     for k, week in enumerate(chosen):
         plant: Any = site.plant(week, "after")
+        model, unmeasured = drawn_models()[k % MODELS]
         made.append(SimulatedPlant(
-            plant.given, plant.system, drawn_models()[k % MODELS], control_steps=plant.control_steps,
+            replace(plant.given, unmeasured=unmeasured), plant.system, model, control_steps=plant.control_steps,
             noise=SensorNoise(), forecaster=plant.forecaster, warm_up_days=WARM_UP_DAYS, seed=week[1],
         ))  # fmt: skip
     return made
@@ -178,7 +173,7 @@ def main() -> None:
     found = rows(site, options.out)
     told = [dict(ActorNetwork.load(path).about) for path in sorted(options.out.glob("*.npz"))]
     seconds = float(np.mean([one["seconds"] for one in told]))
-    many = f"{MODELS} models in the ensemble, drawn by the standard errors of their parameters"
+    many = f"{MODELS} models in the ensemble, out of those that the diagnosis leaves possible"
     if site.key != "office":
         many = f"{len(SEASONS)} models in the ensemble, of telemetry of {', '.join(SEASONS)}"
     note = (

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import scipy.linalg as sl
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from calibration.errors import FilterError
 from calibration.estimation.state_space import StateSpace
@@ -88,6 +89,30 @@ class DisturbanceModel:
             return 1.0, heat * np.sqrt(step / RANDOM_WALK_TIME)
         # 1 - φ² by expm1: the step may be a millionth of the time constant
         return float(np.exp(-step / self.time_constant)), heat * np.sqrt(-np.expm1(-2.0 * step / self.time_constant))
+
+    def drawn(self, step: float, n_steps: int, n_zone: int, rng: np.random.Generator) -> FloatArray:
+        """Draw the heat, shape (n_steps, n_zone) [W]; a random walk begins at 0.
+
+        Parameters
+        ----------
+        step : float
+            Step [s].
+        n_steps, n_zone : int
+            How many.
+        rng : numpy.random.Generator
+            Makes the draw.
+
+        Examples
+        --------
+        >>> heat = DisturbanceModel(100.0, 3600.0, 0.05).drawn(300.0, 100_000, 1, np.random.default_rng(0))
+        >>> round(heat.std())
+        101
+        """
+        keep, added = self.discrete(step)
+        shocks = rng.standard_normal((n_steps, n_zone))
+        shocks[0] *= 0.0 if self.random_walk else self.deviation
+        shocks[1:] *= added
+        return np.asarray(lfilter([1.0], [1.0, -keep], shocks, axis=0))
 
     def near(self, other: DisturbanceModel, limit: float) -> bool:
         """Whether every number is within a share of another disturbance's.

@@ -230,7 +230,24 @@ def read_settings(path: str | Path) -> dict[str, Any]:
         content = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
-    settings = content.get("settings", {}) if isinstance(content, dict) else {}
+    return told_settings(content.get("settings", {}) if isinstance(content, dict) else {}, path)
+
+
+def told_settings(settings: Any, path: Path) -> dict[str, Any]:
+    """Read settings as `ModelSettings.to_dict` tells them; arguments of `ModelSettings`.
+
+    Parameters
+    ----------
+    settings : mapping of str to Any
+        Out of a file.
+    path : Path
+        The file, which errors name.
+
+    Raises
+    ------
+    CalibrationError
+        When they are something else.
+    """
 
     def refuse(what: str, expected: str, found: Any) -> CalibrationError:
         return CalibrationError(f"{path}: {what}: expected {expected}, found {found!r}")

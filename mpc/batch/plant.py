@@ -16,6 +16,7 @@ from mpc.loop.loop import LoopState
 from mpc.loop.plant import need_running
 from mpc.loop.reduced import ReducedBuilding
 from mpc.loop.simulated import SimulatedPlant
+from mpc.scenario.scenario import Scenario
 from thermal._types import FloatArray, IntArray
 from thermal.batch.program import Program
 from thermal.batch.trace import Traced
@@ -78,11 +79,9 @@ class BatchedPlant:
             PlantActionError.unless_known(name, known, "actions", "an actuator of the plants")
         chosen = [known[name] for name in self.actions]
         self._lowest, self._highest = (np.array([[getattr(a, end)] for a in chosen]) for end in ("lowest", "highest"))
-        self._random_people = any(
-            not np.array_equal(p.scenario.redrawn(0).occupancy, p.scenario.redrawn(1).occupancy) for p in self.plants
-        )
+        self._redrawn = any(_differ(p.scenario.redrawn(0), p.scenario.redrawn(1)) for p in self.plants)
         models, self._model_of = different_models([p.model for p in self.plants])  # type: ignore[misc]
-        own = ("gains", "people", "outside") if self._random_people else ()
+        own = ("gains", "people", "outside") if self._redrawn else ()
         self._building = BatchedBuilding(models)
         driving = [plant_rows(p, self._building.outside) for p in self.plants]
         self._rows = DrivingRows(driving, members, own, dtype)
@@ -235,8 +234,8 @@ class BatchedPlant:
         self._set_out(number, who, warm)
         for member in index:
             seed = int(self.seeds[member])
-            scenario = plant.given.redrawn(seed) if self._random_people else plant.given
-            own = people_rows(plant, scenario, self._building.outside) if self._random_people else None
+            scenario = plant.given.redrawn(seed) if self._redrawn else plant.given
+            own = people_rows(plant, scenario, self._building.outside) if self._redrawn else None
             self._rows.begin(member, number, own)
             if self._noise is not None:
                 self._noise.begin(member, seed)
@@ -335,6 +334,11 @@ class BatchedPlant:
     def history(self) -> tuple[Array, Array] | None:
         """Zones at the edges of steps, counted from the reference temperature [K], and powers [W], with `record`."""
         return self._history
+
+
+def _differ(one: Scenario, other: Scenario) -> bool:
+    """Whether people or heat of two draws differ."""
+    return any(not np.array_equal(getattr(one, name), getattr(other, name)) for name in ("occupancy", "gains"))
 
 
 def record_of(history: tuple[Array, Array] | None, member: int, steps: int, seconds: float) -> PlantRecord:

@@ -10,6 +10,7 @@ import pandas as pd
 from calibration.diagnosis.decide.levels import LARGEST_GROUP
 from calibration.diagnosis.decide.verdict import Candidate, generic_from
 from calibration.diagnosis.diagnosis import Diagnosis, Replay
+from calibration.diagnosis.posterior import posterior_of
 from calibration.diagnosis.refit.search import Round, accepted_from
 from calibration.results import Content, check_results_folder
 from mpc.reports import diagnosis_words
@@ -54,8 +55,9 @@ def write_diagnosis(
 ) -> Path:
     """Write what a diagnosis found: numbers, series, the final model and a page.
 
-    Files are ``diagnosis.json``, ``calibration.json`` of the model with all accepted effects, ``missing_watts.parquet``
-    by zone and hour, ``predictions.parquet`` of the held-out runs without and with effects, and ``report.html``.
+    Files are ``diagnosis.json``, ``calibration.json`` of the model with all accepted effects, ``posterior.json`` of the
+    models that are possible, ``missing_watts.parquet`` by zone and hour, ``predictions.parquet`` of the held-out runs
+    without and with effects, and ``report.html``.
 
     Parameters
     ----------
@@ -101,6 +103,7 @@ def diagnosis_files(result: Diagnosis, case: Case) -> dict[str, Content]:
     return {
         "diagnosis.json": diagnosis_summary(result),
         "calibration.json": result.calibration(),
+        "posterior.json": posterior_of(result, case.building).to_dict(),
         "missing_watts.parquet": _missing_table(result, models),
         "predictions.parquet": _predictions(models),
         "report.html": render("diagnosis", _content(result, case, models)),

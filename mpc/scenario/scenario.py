@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 import pandas as pd
 
+from calibration.estimation.disturbance import DisturbanceModel
 from mpc.errors import ScenarioError
 from mpc.scenario.gains import InternalGains
 from mpc.scenario.grid import StepGrid
@@ -57,6 +58,10 @@ class Scenario:
         Where the people come from.
     heat : InternalGains
         What they and their equipment give off.
+    unmeasured : DisturbanceModel, optional
+        Heat in the zones that nobody measures or foresees; none by default.
+    seed : int
+        Of that heat.
     """
 
     building: Building
@@ -77,21 +82,28 @@ class Scenario:
     carbon_kind: str
     people: Occupancy
     heat: InternalGains
+    unmeasured: DisturbanceModel | None = None
+    seed: int = 0
 
     def redrawn(self, seed: int) -> Scenario:
-        """Let other people come and go, as for the next episode of a training; all else stays.
+        """Let other people and unmeasured heat come and go, as for the next episode of a training; all else stays.
 
         Parameters
         ----------
         seed : int
             Same seed, same people at the same times; 0 or more.
         """
-        return replace(self, occupancy=self.people.draw(self.grid, self.zones, seed))
+        return replace(self, occupancy=self.people.draw(self.grid, self.zones, seed), seed=seed)
 
     @cached_property
     def gains(self) -> FloatArray:
-        """Sensible heat of people, light and equipment into the zones, shape (n_steps, n_zone) [W]."""
-        return self.heat.heat(self.occupancy, self.assigned, self.areas)
+        """Sensible heat of people, light and equipment into the zones, and unmeasured heat, (n_steps, n_zone) [W]."""
+        heat = self.heat.heat(self.occupancy, self.assigned, self.areas)
+        if self.unmeasured is None:
+            return heat
+        rng = np.random.default_rng((self.seed, len("unmeasured")))  # another stream than that of the people
+        n_steps, n_zone = heat.shape
+        return np.asarray(heat + self.unmeasured.drawn(self.grid.step, n_steps, n_zone, rng))
 
     @cached_property
     def expected_gains(self) -> FloatArray:

@@ -1,0 +1,235 @@
+"""Models that a diagnosis leaves possible: sets of effects by their probability, parameters by their covariance.
+
+What a controller or a policy is to stand that must not trust one model: it is tried, or trained, on draws of these.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from calibration.diagnosis.decide.verdict import levelled, probabilities
+from calibration.diagnosis.diagnosis import Diagnosis
+from calibration.diagnosis.refit.comparison import Fit
+from calibration.diagnosis.refit.search import accepted_from
+from calibration.errors import CalibrationError, FilterError
+from calibration.estimation.disturbance import DisturbanceModel
+from calibration.evaluation.settings import ModelSettings, told_settings
+from calibration.results import plain
+from thermal._types import FloatArray
+from thermal.case.building import Building
+
+#: Probability below which a set of effects is left out [-].
+_LEAST = 0.01
+
+
+@dataclass(frozen=True)
+class DrawnModel:
+    """A model out of those that are possible.
+
+    Parameters
+    ----------
+    settings : ModelSettings
+        How it is built, with its effects.
+    values : mapping of str to float
+        Parameters by name [parameter units].
+    disturbance : DisturbanceModel or None
+        Heat that it leaves unexplained.
+    """
+
+    settings: ModelSettings
+    values: Mapping[str, float]
+    disturbance: DisturbanceModel | None
+
+
+@dataclass(frozen=True)
+class Possible:
+    """Models with one set of effects: a normal distribution of their parameters on the estimation scale.
+
+    Parameters
+    ----------
+    probability : float
+        That these are the effects that are there [-].
+    settings : ModelSettings
+        How they are built, with the effects.
+    values : mapping of str to float
+        The likeliest parameters by name [parameter units].
+    estimated : tuple of str
+        Names of those that were fitted.
+    covariance : ndarray, shape (n_estimated, n_estimated)
+        Of these, on the estimation scale [-].
+    """
+
+    probability: float
+    settings: ModelSettings
+    values: Mapping[str, float]
+    estimated: tuple[str, ...]
+    covariance: FloatArray
+
+    def drawn(self, building: Building, rng: np.random.Generator) -> dict[str, float]:
+        """Draw parameters, within their ranges.
+
+        Parameters
+        ----------
+        building : Building
+            That the diagnosis was made of.
+        rng : numpy.random.Generator
+            Makes the draw.
+
+        Raises
+        ------
+        CalibrationError
+            When the building has no such parameters.
+        """
+        parameters = {p.name: p for p in self.settings.network(building).parameters}
+        if set(self.values) != set(parameters):
+            raise CalibrationError("posterior", f"parameters of {building.name}", "those of another building")
+        values = dict(self.values)
+        moved = rng.multivariate_normal(np.zeros(len(self.estimated)), self.covariance, method="eigh")
+        for name, step in zip(self.estimated, moved, strict=True):
+            p = parameters[name]
+            values[name] = float(np.clip(p.inverse(p.transform(values[name]) + step), p.lower, p.upper))
+        return values
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """What a diagnosis leaves possible.
+
+    Parameters
+    ----------
+    models : tuple of Possible
+        By sets of effects; their probabilities sum to 1.
+    disturbance : DisturbanceModel or None
+        Heat that the likeliest of them leaves unexplained, where it is known.
+
+    Examples
+    --------
+    >>> from calibration import diagnose
+    >>> from thermal.data import load_bundled_case
+    >>> case = load_bundled_case()
+    >>> found = posterior_of(diagnose(case, dx=1.0), case.building)  # doctest: +SKIP
+    >>> [sorted(one.settings.effects) for one in found.draw(case.building, 8)]  # doctest: +SKIP
+    """
+
+    models: tuple[Possible, ...]
+    disturbance: DisturbanceModel | None
+
+    def draw(self, building: Building, count: int, seed: int = 0) -> tuple[DrawnModel, ...]:
+        """Draw models: first a set of effects by its probability, then its parameters.
+
+        Parameters
+        ----------
+        building : Building
+            That the diagnosis was made of.
+        count : int
+            How many.
+        seed : int
+            Of the draws.
+
+        Raises
+        ------
+        CalibrationError
+            When the building is another one.
+        """
+        rng = np.random.default_rng(seed)
+        chosen = rng.choice(len(self.models), size=count, p=[one.probability for one in self.models])
+        return tuple(
+            DrawnModel(self.models[k].settings, self.models[k].drawn(building, rng), self.disturbance) for k in chosen
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Contents of ``posterior.json``."""
+        models = [vars(one) | {"settings": one.settings.to_dict()} for one in self.models]
+        content: dict[str, Any] = plain({"models": models, "disturbance": self.disturbance})
+        return content
+
+
+def posterior_of(diagnosis: Diagnosis, building: Building) -> Posterior:
+    """Gather what a diagnosis leaves possible.
+
+    Sets of effects are those of its search: without what a round accepted, with it, and with another effect that the
+    round fitted in its place. Where another structure predicts better, that structure is all there is, its parameters
+    independent of each other.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        From `diagnose`.
+    building : Building
+        That it was made of.
+    """
+    better = diagnosis.better
+    if better is not None:
+        parameters = {p.name: p for p in better.settings.network(building).parameters}
+        known = {p.name: p.standard_error / parameters[p.name].slope(p.value) for p in better.parameters
+                 if p.standard_error is not None and p.name in parameters}  # fmt: skip
+        spread = np.array([min(error, parameters[name].prior_deviation) for name, error in known.items()])
+        values = {p.name: p.value for p in better.parameters if p.name in parameters}
+        only = Possible(1.0, better.settings, values, tuple(known), np.diag(spread**2))
+        return Posterior((only,), better.disturbance)
+    kept = [(share, fit) for share, fit in _chances(diagnosis) if share >= _LEAST]
+    whole = sum(share for share, _ in kept)
+    return Posterior(tuple(_possible(share / whole, fit, diagnosis) for share, fit in kept), diagnosis.disturbance)
+
+
+def _chances(diagnosis: Diagnosis) -> list[tuple[float, Fit]]:
+    """Fits of a search with the probability that each has all that is there."""
+    judged = {c.effect: c.probability for c in diagnosis.verdict.candidates}
+    found, real = list[tuple[float, Fit]](), 1.0
+    for r in diagnosis.rounds:
+        if r.accepted is None:
+            break
+        share, none = probabilities(levelled(r), accepted_from(r.own))
+        own = r.accepted.screened.effect
+        others = {x.screened.effect: x.fit for x in r.refits if x.screened.effect != own}
+        fitted = share[own] + sum(share[e] for e in others)
+        there = min(1.0 - none, (judged[own] + sum(judged[e] for e in others)) / real)
+        found.append((real * (1.0 - there), r.before))
+        found += [(real * there * share[e] / fitted, fit) for e, fit in others.items()]
+        real *= there * share[own] / fitted
+    return [*found, (real, diagnosis.rounds[-1].after)]
+
+
+def _possible(probability: float, fit: Fit, diagnosis: Diagnosis) -> Possible:
+    names = tuple(p.name for p in fit.problem.parameters)
+    covariance = np.linalg.inv(fit.found.jacobian.T @ fit.found.jacobian)
+    settings = replace(diagnosis.settings, effects=fit.effects)
+    return Possible(probability, settings, fit.values, names, np.asarray(covariance))
+
+
+def read_posterior(path: str | Path) -> Posterior:
+    """Read what a diagnosis left possible.
+
+    Parameters
+    ----------
+    path : str or Path
+        A ``posterior.json``.
+
+    Raises
+    ------
+    CalibrationError
+        When the file cannot be read, or holds something else.
+    """
+    path = Path(path)
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise CalibrationError(f"{path}: expected a posterior as `diagnose` writes it, found {error}") from error
+    try:
+        models, heat = tuple(_read(one, path) for one in content["models"]), content["disturbance"]
+        return Posterior(models, None if heat is None else DisturbanceModel(**heat))
+    except (KeyError, TypeError, ValueError, FilterError) as error:
+        raise CalibrationError(f"{path}: expected a posterior as `diagnose` writes it, found {error!r}") from error
+
+
+def _read(entry: Mapping[str, Any], path: Path) -> Possible:
+    estimated = tuple(entry["estimated"])
+    covariance = np.array(entry["covariance"], dtype=float).reshape(len(estimated), len(estimated))
+    settings = ModelSettings(**told_settings(entry["settings"], path))
+    return Possible(float(entry["probability"]), settings, entry["values"], estimated, covariance)
