@@ -71,15 +71,17 @@ class Possible:
     estimated: tuple[str, ...]
     covariance: FloatArray
 
-    def drawn(self, building: Building, rng: np.random.Generator) -> dict[str, float]:
-        """Draw parameters, within their ranges.
+    def draw(self, building: Building, count: int, rng: np.random.Generator) -> list[dict[str, float]]:
+        """Draw parameters within their ranges, by name [parameter units].
 
         Parameters
         ----------
         building : Building
             That the diagnosis was made of.
+        count : int
+            How many.
         rng : numpy.random.Generator
-            Makes the draw.
+            Makes the draws.
 
         Raises
         ------
@@ -89,12 +91,14 @@ class Possible:
         parameters = {p.name: p for p in self.settings.network(building).parameters}
         if set(self.values) != set(parameters):
             raise CalibrationError("posterior", f"parameters of {building.name}", "those of another building")
-        values = dict(self.values)
-        moved = rng.multivariate_normal(np.zeros(len(self.estimated)), self.covariance, method="eigh")
-        for name, step in zip(self.estimated, moved, strict=True):
-            p = parameters[name]
-            values[name] = float(np.clip(p.inverse(p.transform(values[name]) + step), p.lower, p.upper))
-        return values
+        estimated = [parameters[name] for name in self.estimated]
+        likely = np.array([p.transform(self.values[p.name]) for p in estimated])
+        points = rng.multivariate_normal(likely, self.covariance, size=count, method="eigh")
+        return [
+            dict(self.values)
+            | {p.name: float(np.clip(p.inverse(z), p.lower, p.upper)) for p, z in zip(estimated, point, strict=True)}
+            for point in points.tolist()
+        ]
 
 
 @dataclass(frozen=True)
@@ -121,7 +125,7 @@ class Posterior:
     disturbance: DisturbanceModel | None
 
     def draw(self, building: Building, count: int, seed: int = 0) -> tuple[DrawnModel, ...]:
-        """Draw models: first a set of effects by its probability, then its parameters.
+        """Draw models, those with the same effects side by side.
 
         Parameters
         ----------
@@ -137,11 +141,13 @@ class Posterior:
         CalibrationError
             When the building is another one.
         """
-        rng = np.random.default_rng(seed)
-        chosen = rng.choice(len(self.models), size=count, p=[one.probability for one in self.models])
-        return tuple(
-            DrawnModel(self.models[k].settings, self.models[k].drawn(building, rng), self.disturbance) for k in chosen
-        )
+        rng, drawn = np.random.default_rng(seed), list[DrawnModel]()
+        counts = rng.multinomial(count, [one.probability for one in self.models])
+        for one, times in zip(self.models, counts.tolist(), strict=True):
+            if times:
+                values = one.draw(building, times, rng)
+                drawn += [DrawnModel(one.settings, v, self.disturbance) for v in values]
+        return tuple(drawn)
 
     def to_dict(self) -> dict[str, Any]:
         """Contents of ``posterior.json``."""
@@ -199,7 +205,7 @@ def _chances(diagnosis: Diagnosis) -> list[tuple[float, Fit]]:
 def _possible(probability: float, fit: Fit, diagnosis: Diagnosis) -> Possible:
     names = tuple(p.name for p in fit.problem.parameters)
     covariance = np.linalg.inv(fit.found.jacobian.T @ fit.found.jacobian)
-    settings = replace(diagnosis.settings, effects=fit.effects)
+    settings = replace(fit.settings, effects=fit.effects, normalisation=diagnosis.settings.normalisation)
     return Possible(probability, settings, fit.values, names, np.asarray(covariance))
 
 
@@ -223,6 +229,8 @@ def read_posterior(path: str | Path) -> Posterior:
         raise CalibrationError(f"{path}: expected a posterior as `diagnose` writes it, found {error}") from error
     try:
         models, heat = tuple(_read(one, path) for one in content["models"]), content["disturbance"]
+        if not models:
+            raise ValueError("no models")
         return Posterior(models, None if heat is None else DisturbanceModel(**heat))
     except (KeyError, TypeError, ValueError, FilterError) as error:
         raise CalibrationError(f"{path}: expected a posterior as `diagnose` writes it, found {error!r}") from error

@@ -198,7 +198,7 @@ def spatial_metrics(error: FloatArray) -> Metrics:
     Parameters
     ----------
     error : ndarray, shape (n_run, n_zone)
-        Simulated minus measured [K], NaN where not measured.
+        Simulated minus measured [K], NaN where not measured; a run in which nothing is has no part.
 
     Notes
     -----
@@ -209,6 +209,9 @@ def spatial_metrics(error: FloatArray) -> Metrics:
     >>> spatial_metrics(np.array([[0.5, -0.1], [0.2, 0.4]]))
     Metrics(mae=0.3, median=0.25, bias=0.25)
     """
+    error = error[np.isfinite(error).any(axis=1)]
+    if not error.size:
+        return Metrics(mae=float("nan"), median=float("nan"), bias=float("nan"))
     return Metrics(
         mae=round(float(np.nanmean(np.nanmean(np.abs(error), axis=1))), 12),
         median=round(float(np.nanmean(np.nanmedian(error, axis=1))), 12),

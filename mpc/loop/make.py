@@ -7,6 +7,7 @@ from typing import Literal, get_args
 
 import pandas as pd
 
+from calibration.estimation.disturbance import DisturbanceModel
 from calibration.evaluation.settings import ModelSettings
 from mpc.errors import PlantError
 from mpc.loop.building import BuildingModel, GridBuilding
@@ -169,6 +170,8 @@ class PlantSettings(SimulationSettings):
         Largest number of states of a reduced building.
     gains : InternalGains, optional
         Heat of people, light and equipment; an office's, all of it into the air, by default.
+    unmeasured : DisturbanceModel, optional
+        Heat that nobody measures or foresees; none by default.
     step_seconds : float
         Step of the plant [s].
     control_steps : int
@@ -184,6 +187,7 @@ class PlantSettings(SimulationSettings):
     effects: tuple[Chosen, ...] = ()
     order: int | None = None
     gains: InternalGains | None = None
+    unmeasured: DisturbanceModel | None = None
     step_seconds: float = 300.0
     control_steps: int = 1
     horizon: int | None = None
@@ -219,7 +223,7 @@ def simulated_plant(
     """
     given, (building, _) = settings or PlantSettings(), equip(building)
     grid = StepGrid.between(start, end, given.step_seconds, building)
-    scenario = given.scenario(building, grid, weather, given.gains)
+    scenario = replace(given.scenario(building, grid, weather, given.gains), unmeasured=given.unmeasured)
     built = model_settings(given.parameters, dx=given.dx, effects=given.effects)
     effects = given.effects or chosen(built.effects)
     system = given.system or size_system(building)

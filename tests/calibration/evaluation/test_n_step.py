@@ -33,7 +33,7 @@ def test_spatial_error_is_the_paper_s() -> None:
 
 def test_zones_that_are_not_measured_do_not_count() -> None:
     """Run 1 knows one zone, run 2 both: eps = 1.0 and 0.3, whose mean is not that of the three errors."""
-    found = spatial_metrics(np.array([[1.0, np.nan], [0.2, -0.4]]))
+    found = spatial_metrics(np.array([[1.0, np.nan], [np.nan, np.nan], [0.2, -0.4]]))
     assert found.mae == pytest.approx(0.65)
     assert found.bias == pytest.approx(0.45)
     assert found.median == pytest.approx(0.45)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from calibration.estimation.disturbance import DisturbanceModel
 from mpc.batch.alike import driven_by
 from mpc.batch.inputs import plant_rows
 from mpc.batch.plant import BatchedPlant
@@ -114,6 +115,16 @@ def test_members_differ_in_what_was_found() -> None:
         batch.step(np.repeat(row, 3, axis=1))
     zone = batch.zone_temperature
     assert min(np.abs(zone[:, a] - zone[:, b]).max() for a, b in ((0, 1), (1, 2), (0, 2))) > 1e-3
+
+
+def test_members_have_unmeasured_heat_of_their_own() -> None:
+    plant = plant_of("2023-01-09", 1)
+    heat = DisturbanceModel(np.full(4, 200.0), 7200.0, 0.03)
+    plants = [plant_of("2023-01-09", 1, unmeasured=heat), plant]
+    batch = BatchedPlant(plants, 3, dtype=np.float64)
+    assert follow(batch, [0, 0, 1], [3, 4, 3], 200) <= EXACT
+    zone = batch.zone_temperature
+    assert np.abs(zone[:, 0] - zone[:, 1]).max() > 0.1
 
 
 def test_members_may_start_anew_alone() -> None:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from calibration.estimation.disturbance import DisturbanceModel
 from mpc.errors import ScenarioError, WeatherError
 from mpc.loop.signals import scenario_inputs
 from mpc.scenario.gains import InternalGains
@@ -64,6 +66,20 @@ def test_another_seed_brings_other_people_and_nothing_else(bundled: Scenario) ->
     same = other.redrawn(3)
     for name in ("occupancy", "gains", "latent", "expected_gains"):
         assert np.array_equal(getattr(same, name), getattr(bundled, name)), name
+
+
+def test_unmeasured_heat_is_in_the_zones_and_foreseen_by_nobody(bundled: Scenario) -> None:
+    heat = DisturbanceModel(80.0, 7200.0, 0.03)
+    disturbed = replace(bundled, unmeasured=heat)
+    added = disturbed.gains - bundled.gains
+    assert added.std() == pytest.approx(80.0, rel=0.15) and np.abs(added.mean()) < 20.0
+    keep, _ = heat.discrete(bundled.grid.step)
+    along = np.corrcoef(added[:-1].ravel(), added[1:].ravel())[0, 1]
+    assert along == pytest.approx(keep, abs=0.02)
+    assert abs(np.corrcoef(added[:, 0], added[:, 1])[0, 1]) < 0.5
+    assert np.array_equal(disturbed.expected_gains, bundled.expected_gains)
+    assert not np.array_equal(disturbed.redrawn(9).gains - bundled.redrawn(9).gains, added)
+    assert np.array_equal(disturbed.redrawn(bundled.seed).gains, disturbed.gains)
 
 
 def test_effects_find_what_drives_them(bundled: Scenario) -> None:
