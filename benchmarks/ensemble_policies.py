@@ -45,7 +45,7 @@ from mpc.environment.policy import ActorNetwork
 from mpc.loop.noise import SensorNoise
 from mpc.loop.reduced import ReducedBuilding
 from mpc.loop.simulated import SimulatedPlant
-from mpc.model import reduced
+from mpc.model import control_model
 
 WORLDS = ("before", "after", "ensemble", "plant")
 MODELS, BEGINNINGS, ROUNDS, WEEKS_LEARNED = 8, 32, 610, 26
@@ -58,10 +58,7 @@ BESIDE = {"ppo_plant": "EnergyPlus, PPO of `train_rl`", "sac_plant": "EnergyPlus
 def drawn_models(count: int = MODELS) -> list[tuple[ReducedBuilding, DisturbanceModel | None]]:
     """Draw models that the diagnosis leaves possible, with the heat that they leave unexplained."""
     drawn = read_posterior(posterior_file()).draw(office(), count)
-    return [
-        (ReducedBuilding(reduced(one.settings, office(), one.values), step_seconds=STEP), one.disturbance)
-        for one in drawn
-    ]
+    return [(ReducedBuilding(control_model(office(), one), step_seconds=STEP), one.disturbance) for one in drawn]
 
 
 def plants_of(site: Site, world: str) -> list[Any]:

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from calibration.evaluation.drawn import DrawnModel
 from calibration.evaluation.settings import ModelSettings, load_parameters, read_settings
 from calibration.fit.result import CalibrationResult
 from mpc.errors import ControlError
@@ -14,8 +15,8 @@ from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import ReducedModel, reduced_model
 from thermal.network.network import ThermalNetwork
 
-#: Parameters of a building: a ``calibration.json`` or what it was written from, or values by name.
-BuildingParameters = str | Path | Mapping[str, float] | CalibrationResult
+#: Parameters of a building: a ``calibration.json`` or what it was written from, a drawn model, or values by name.
+BuildingParameters = str | Path | Mapping[str, float] | CalibrationResult | DrawnModel
 
 #: Largest number of states of a controller's model: 76 mK from the grid on 123 zones at 0.5 m, at a third of the time.
 ORDER = 201
@@ -35,7 +36,7 @@ def control_model(
     ----------
     building : Building
         Floor plans or a zone table.
-    parameters : str, Path, CalibrationResult or mapping of str to float, optional
+    parameters : str, Path, CalibrationResult, DrawnModel or mapping of str to float, optional
         A ``calibration.json`` or the result itself, whose settings and effects are taken over; or values by name
         [parameter units]; starting values by default.
     dx : float, optional
@@ -73,7 +74,7 @@ def model_settings(
 
     Parameters
     ----------
-    parameters : str, Path, CalibrationResult or mapping of str to float, optional
+    parameters : str, Path, CalibrationResult, DrawnModel or mapping of str to float, optional
         A calibration, or values by name [parameter units].
     dx : float, optional
         Distance between control volumes of a plan [m].
@@ -83,7 +84,7 @@ def model_settings(
     if parameters is None or isinstance(parameters, Mapping):
         return ModelSettings(dx=dx, effects={c.effect.id: c.zones for c in effects})
     ControlError.unless(not effects, "effects", "none beside a file of parameters", f"{len(effects)} of them")
-    if isinstance(parameters, CalibrationResult):
+    if isinstance(parameters, CalibrationResult | DrawnModel):
         built = parameters.settings
     else:
         built = ModelSettings(**read_settings(parameters))
@@ -101,7 +102,7 @@ def reduced(
         How it is built.
     building : Building
         Floor plans or a zone table.
-    parameters : str, Path, CalibrationResult or mapping of str to float, optional
+    parameters : str, Path, CalibrationResult, DrawnModel or mapping of str to float, optional
         A calibration, or values by name [parameter units].
     order : int, optional
         Largest number of states.
@@ -115,13 +116,15 @@ def parameter_vector(parameters: BuildingParameters | None, network: ThermalNetw
 
     Parameters
     ----------
-    parameters : str, Path, CalibrationResult or mapping of str to float, optional
+    parameters : str, Path, CalibrationResult, DrawnModel or mapping of str to float, optional
         A calibration, or values by name [parameter units]; starting values for the rest.
     network : ThermalNetwork
         Whose parameters they are.
     """
     if isinstance(parameters, CalibrationResult):
         return parameters.theta
+    if isinstance(parameters, DrawnModel):
+        return network.values(parameters.values)
     if isinstance(parameters, str | Path):
         return load_parameters(parameters, network)
     return network.values(parameters or {})

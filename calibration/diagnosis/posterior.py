@@ -19,6 +19,7 @@ from calibration.diagnosis.refit.comparison import Fit
 from calibration.diagnosis.refit.search import accepted_from
 from calibration.errors import CalibrationError, FilterError
 from calibration.estimation.disturbance import DisturbanceModel
+from calibration.evaluation.drawn import DrawnModel
 from calibration.evaluation.settings import ModelSettings, told_settings
 from calibration.results import plain
 from thermal._types import FloatArray
@@ -26,25 +27,6 @@ from thermal.case.building import Building
 
 #: Probability below which a set of effects is left out [-].
 _LEAST = 0.01
-
-
-@dataclass(frozen=True)
-class DrawnModel:
-    """A model out of those that are possible.
-
-    Parameters
-    ----------
-    settings : ModelSettings
-        How it is built, with its effects.
-    values : mapping of str to float
-        Parameters by name [parameter units].
-    disturbance : DisturbanceModel or None
-        Heat that it leaves unexplained.
-    """
-
-    settings: ModelSettings
-    values: Mapping[str, float]
-    disturbance: DisturbanceModel | None
 
 
 @dataclass(frozen=True)

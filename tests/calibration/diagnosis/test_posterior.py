@@ -23,6 +23,7 @@ from calibration.diagnosis.refit.search import Round, search
 from calibration.errors import CalibrationError
 from calibration.estimation.disturbance import DisturbanceModel
 from calibration.evaluation.settings import ModelSettings
+from mpc.loop.make import PlantSettings, pilot_weather, simulated_plant
 from thermal import Case
 from thermal.pilot.building import pilot_building
 from thermal.pilot.twin import TwinRanges, TwinSettings, generate_twin
@@ -107,6 +108,11 @@ def test_draws_are_as_wide_as_the_data_leave_them_and_within_their_ranges() -> N
         if inside.all():
             scale = np.std([p.transform(float(v)) for v in drawn])
             assert scale == pytest.approx(np.sqrt(one.covariance[k, k]), rel=0.15), name
+    first = only.draw(office().building, 1, seed=2)[0]
+    settings = PlantSettings(parameters=first, unmeasured=DisturbanceModel(30.0, 3600.0, 0.03))
+    plant = simulated_plant(office().building, pilot_weather(1, "2023-01-09", 2.0), "2023-01-09", "2023-01-10", settings)
+    assert dict(zip(parameters, plant.model.theta.tolist(), strict=True)) == first.values
+    assert SUN in [p.effect for p in plant.model.network.parameters]
     again = [m.values for m in only.draw(office().building, 400, seed=2)]
     assert values == again
 
