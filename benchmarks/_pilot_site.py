@@ -10,6 +10,7 @@ import pandas as pd
 from _site_files import AHEAD
 
 from mpc.adapters.described.schema import PlantFile
+from mpc.kpi.daily import by_day
 from mpc.kpi.record import PlantRecord
 from mpc.loop.actuators import SUPPLY_AIR, SUPPLY_WATER, Actuator
 from mpc.loop.make import PlantSettings, pilot_weather, simulated_plant
@@ -139,14 +140,4 @@ class OwnControl:
 
     def bought(self) -> pd.DataFrame:
         """Cost of energy [currency], energy [kWh] and discomfort of all zones [K h] by local day."""
-        record, scenario = self.record(), self.plant.scenario
-        done, hours = len(record.electricity), STEP / 3600.0
-        gas = np.zeros(done) if record.gas is None else record.gas
-        cost = record.electricity * scenario.electricity_price[:done] + gas * scenario.gas_price[:done]
-        low, high = scenario.lower[:done], scenario.upper[:done]
-        zone = record.zone_temperature[1:]  # at the ends of the steps
-        outside = np.maximum(low - zone, 0.0) + np.maximum(zone - high, 0.0)
-        table = {"cost": cost * hours / 1000.0, "energy": (record.electricity + gas) * hours / 1000.0,
-                 "discomfort": outside.sum(axis=1) * hours}  # fmt: skip
-        begins = pd.DatetimeIndex(scenario.grid.stamps[:done]) - pd.Timedelta(seconds=STEP)
-        return pd.DataFrame(table, index=begins).resample("1D").sum()
+        return by_day(self.record(), self.plant.scenario)

@@ -25,7 +25,7 @@ from mpc.cli.experiment import experiment
 from mpc.cli.identify import identify
 from mpc.cli.imports import import_devices, import_plan, import_telemetry
 from mpc.cli.monitor import monitor
-from mpc.cli.operate import operate, replay
+from mpc.cli.operate import operate, rehearse, replay
 from mpc.cli.options import displaying, switch, value
 from mpc.cli.priors import priors
 from mpc.cli.serve import label, serve
@@ -127,7 +127,7 @@ _REPORTING = (
 for _command in (
     *(demo, doctor, check, import_plan, import_devices, import_telemetry, discover, label),
     *(simulate, evaluate, calibrate, priors, diagnose, experiment, monitor, effects, identify, control, compare),
-    *(verify, operate, replay, serve),
+    *(verify, operate, rehearse, replay, serve),
 ):
     app.command()(_guarded(displaying(_command) if _command in _REPORTING else _command))
 

@@ -1,4 +1,4 @@
-"""``buildingmpc operate`` and ``buildingmpc replay``."""
+"""``buildingmpc operate``, ``buildingmpc rehearse`` and ``buildingmpc replay``."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mpc.cli.console import answer, complain, say, show_table
-from mpc.cli.options import Json, file, ids, value
+from mpc.cli.console import Waiting, answer, complain, say, show_table
+from mpc.cli.options import Force, Json, file, folder, ids, value
 from mpc.errors import LiveError
 
 if TYPE_CHECKING:
+    from pandas import Timestamp
+
     from mpc.live.guard.socket import GuardClient
     from mpc.live.site import Site
 
@@ -175,6 +177,51 @@ def _answered(client: GuardClient, nonce: str, wait: float) -> str:
             return str(known[nonce])
         time.sleep(0.1)
     return "no answer in time; --status says what is in force"
+
+
+def rehearse(
+    site: Annotated[Path, typer.Argument(metavar="SITE", help="site.yaml, with a building as its model.")],
+    out: Annotated[Path, folder("rehearsal.json, days.parquet, report.html")],
+    start: Annotated[str, value("First recorded step that counts, local; default: of all.", "TIME")] = "",
+    end: Annotated[str, value("Where it ends, local; default: with the last one.", "TIME")] = "",
+    force: Force = False,
+    json: Json = False,
+) -> int:
+    """Tell what acting would have saved on recorded days: both controls in closed loop with the site's model.
+
+    Example: buildingmpc rehearse site.yaml --out rehearsed
+    """
+    from calibration.results import check_results_folder
+    from mpc.live.rehearsal import rehearse as rehearsed
+    from mpc.live.site import Site
+    from mpc.reports.rehearsal import day_rows, rehearsal_verdict, write_rehearsal
+
+    check_results_folder(out, force)
+    read = Site(site)
+    zone = read.plant.location.timezone
+    with Waiting(f"rehearse {read.file.name}") as progress:
+        found = rehearsed(read, _local(start, "--start", zone), _local(end, "--end", zone), progress=progress)
+        report = write_rehearsal(found, out, force=force)
+
+    def show() -> None:
+        say(rehearsal_verdict(found))
+        heads = ("day", "own control", "acting", "saved", "own K h", "acting K h", "promised by plans")
+        show_table("Days", dict.fromkeys(heads, ""), day_rows(found))
+
+    return answer(json, found.to_dict(), show, report)
+
+
+def _local(text: str, where: str, timezone: str) -> Timestamp | None:
+    """Read a local time; None for none."""
+    from pandas import Timestamp
+
+    if not text:
+        return None
+    try:
+        read = Timestamp(text)
+        return read.tz_localize(timezone) if read.tzinfo is None else read
+    except ValueError as error:
+        raise LiveError(where, "a time in ISO 8601", repr(text), "for example 2026-01-05") from error
 
 
 def replay(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import pandas as pd
 
@@ -20,8 +21,10 @@ from mpc.model import control_model, model_settings
 from mpc.scenario.forecast import Forecast
 from mpc.studies.optimal_control import Site as ControlledSite
 from mpc.studies.optimal_control import make_controller
+from thermal.case.building import Building
 from thermal.case.load import load_building
 from thermal.system.sizing import size_system
+from thermal.system.system import HvacSystem
 
 
 @dataclass(frozen=True)
@@ -109,19 +112,11 @@ def building_controller(site: Site, model: BuildingModel, actuators: tuple[Actua
     LiveError
         When zones of building and plant differ, or a point that the state is estimated from is none of the site's.
     """
-    here, where = site.path.parent, f"{site.path.name}: model.building"
-    building, _ = equip(load_building(here / model.building))
-    differing = sorted(set(building.zone_names) ^ set(site.plant.zones))
-    expected = f"the zones of {site.plant_path.name}"
-    LiveError.unless(not differing, where, expected, f"other ones: {', '.join(differing[:5])}")
-    system = size_system(building)
+    building, system, parameters = believed(site, model)
     devices = plant_devices(building, system)
-    parameters = None if model.parameters is None else here / model.parameters
-    own = model.own_control
-    settings = ControllerSettings(rule=ResetRule(own.cold, own.warm, own.air, own.water))
-    believed = control_model(building, parameters)
+    settings = ControllerSettings(rule=own_rule(model))
     controller = make_controller(
-        believed, _Reached(site.step, actuators),
+        control_model(building, parameters), _Reached(site.step, actuators),
         site=ControlledSite(building, devices.named(system), devices), settings=settings,
     )  # fmt: skip
     zones = {f"{name}/zone_air_temperature_sensor" for name in controller.points.terminals}
@@ -130,3 +125,43 @@ def building_controller(site: Site, model: BuildingModel, actuators: tuple[Actua
     expected = "all that the state of a building is estimated from"
     LiveError.unless(not missing, f"{site.path.name}: points", expected, f"none of {', '.join(missing[:5])}")
     return BuildingController(controller, "internal_gains" in model_settings(parameters).effects)
+
+
+def believed(site: Site, model: BuildingModel) -> tuple[Building, HvacSystem, Path | None]:
+    """Give what a site's controller takes its building for.
+
+    Parameters
+    ----------
+    site : Site
+        As read.
+    model : BuildingModel
+        Of its file.
+
+    Returns
+    -------
+    tuple
+        The building with its devices, its HVAC system, sized from its loads, and its parameters.
+
+    Raises
+    ------
+    LiveError
+        When zones of building and plant differ.
+    """
+    here, where = site.path.parent, f"{site.path.name}: model.building"
+    building, _ = equip(load_building(here / model.building))
+    differing = sorted(set(building.zone_names) ^ set(site.plant.zones))
+    expected = f"the zones of {site.plant_path.name}"
+    LiveError.unless(not differing, where, expected, f"other ones: {', '.join(differing[:5])}")
+    return building, size_system(building), None if model.parameters is None else here / model.parameters
+
+
+def own_rule(model: BuildingModel) -> ResetRule:
+    """Give the building's own control.
+
+    Parameters
+    ----------
+    model : BuildingModel
+        Of the site's file.
+    """
+    own = model.own_control
+    return ResetRule(own.cold, own.warm, own.air, own.water)

@@ -1,0 +1,271 @@
+"""What acting would have saved on recorded days: optimal control and the building's own, each run on the site's model.
+
+A plan says what it costs beside the rule from the same state on, over its horizon. Added up over a day that is no
+saving: a plan leaves out what the building needs once its horizon is over, and is never followed to its end. So both
+controls are run through the days in closed loop, with the weather that was measured and the forecasts that there were.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from calibration.progress import Progress
+from calibration.results import Axes, Result, plain
+from mpc.adapters.boptest.scenario import DAY
+from mpc.adapters.described.conditions import SeriesGains
+from mpc.baselines.rules import OutdoorReset
+from mpc.errors import LiveError
+from mpc.kpi.daily import by_day
+from mpc.live.audit import log_files
+from mpc.live.building import believed, own_rule
+from mpc.live.past import past_table
+from mpc.live.planner import Planner, forecast_of_dict
+from mpc.live.site import Site
+from mpc.live.site_file import BuildingModel
+from mpc.loop.noise import SensorNoise
+from mpc.loop.plant import Controller
+from mpc.loop.reduced import ReducedBuilding
+from mpc.loop.simulated import SimulatedPlant
+from mpc.model import control_model, model_settings
+from mpc.scenario.forecast import Forecast
+from mpc.scenario.grid import StepGrid
+from mpc.scenario.occupancy import ScheduledOccupancy
+from mpc.scenario.scenario import Scenario, zone_areas
+from mpc.scenario.weather import WEATHER_POINTS, Weather
+from mpc.studies.optimal_control import MODEL_STEP
+from thermal._types import FloatArray
+from thermal.case.building import Building
+from thermal.case.points import OUTDOOR_TEMPERATURE
+
+#: Days that the first one is run through beforehand, under the building's own control [d]: walls forget how they began.
+_WARM_UP = 3
+
+#: Seed of the sensors' noise.
+_SEED = 0
+
+
+@dataclass(frozen=True, repr=False)
+class Rehearsal(Result):
+    """What two controls would have cost on the same days, by the model.
+
+    Parameters
+    ----------
+    site : str
+        Name.
+    days : DataFrame, shape (n_day, 7)
+        By local midnight: ``cost`` [currency], ``energy`` [kWh] and ``discomfort`` [K h] of optimal control,
+        ``own_cost``, ``own_energy`` and ``own_discomfort`` of the building's own, and ``promised``, the share of the
+        cost that the plans of the day had expected to save by themselves [-].
+    currency : str
+        Of the costs.
+    steps, lost : int
+        Control steps, and those of them without a forecast.
+    """
+
+    site: str
+    days: pd.DataFrame
+    currency: str
+    steps: int
+    lost: int = field(default=0)
+
+    @property
+    def saving(self) -> float:
+        """Share of the cost of the building's own control that acting saves [-]; NaN where that costs nothing."""
+        own = float(self.days["own_cost"].sum())
+        return 1.0 - float(self.days["cost"].sum()) / own if own > 0.0 else math.nan
+
+    @property
+    def promised(self) -> float:
+        """The same by the plans themselves, weighted by what the rule costs [-]."""
+        known = self.days.dropna(subset="promised")
+        weight = known["own_cost"].sum()
+        return float((known["own_cost"] * known["promised"]).sum() / weight) if weight > 0.0 else math.nan
+
+    def to_frame(self) -> pd.DataFrame:
+        """Tabulate the days, as `days` with ``saving`` [-]."""
+        own = self.days["own_cost"]
+        return self.days.assign(saving=1.0 - self.days["cost"] / own.where(own > 0.0))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Contents of ``rehearsal.json``."""
+        days = [{"day": str(day.date()), **row} for day, row in zip(
+            pd.DatetimeIndex(self.days.index), self.to_frame().to_dict("records"), strict=True)]  # fmt: skip
+        content: dict[str, Any] = plain({
+            "site": self.site, "saving": self.saving, "promised": self.promised, "currency": self.currency,
+            "steps": self.steps, "lost": self.lost, "days": days,
+        })  # fmt: skip
+        return content
+
+    def _summary(self) -> str:
+        return f"{self.site}, {len(self.days)} days: {self.saving:.1%} saved; plans promised {self.promised:.1%}"
+
+    def _draw(self, axes: Axes) -> None:
+        shown = self.days[["own_cost", "cost"]].rename(columns={"own_cost": "own control", "cost": "optimal control"})
+        shown.index = pd.DatetimeIndex(shown.index).strftime("%a %d %b")
+        shown.plot.bar(ax=axes, ylabel=f"cost of a day [{self.currency}]", rot=0)
+
+
+@dataclass(frozen=True)
+class _Recorded:
+    """What the controller was asked with, by the begin of the step: means before it, what was forecast, and savings."""
+
+    past: list[dict[str, Any]]
+    now: dict[float, dict[str, float | None]]
+    forecasts: dict[float, Forecast]
+    rules: dict[float, tuple[float, float]]
+
+
+def rehearse(
+    site: Site,
+    begin: pd.Timestamp | None = None,
+    end: pd.Timestamp | None = None,
+    *,
+    controller: Controller | None = None,
+    progress: Progress | None = None,
+) -> Rehearsal:
+    """Run optimal control and the building's own through recorded days, each in closed loop with the site's model.
+
+    Both meet the weather that was measured, prices and bands that were in force, and the forecasts that there were. The
+    building is the controller's own model: what that lacks has no part in it.
+
+    Parameters
+    ----------
+    site : Site
+        As read, with a building as its model; its controller has logged plans, in whatever mode.
+    begin, end : Timestamp, optional
+        Local; the first and last recorded step by default.
+    controller : Controller, optional
+        In the place of the site's own.
+    progress : callable, optional
+        Called with stage, done, total.
+
+    Raises
+    ------
+    LiveError
+        When the site has no building, or less than a day was recorded then.
+    """
+    entry, where = site.file.model, f"{site.path.name}: model"
+    expected = "a building, whose control and own control can be run"
+    if not isinstance(entry, BuildingModel):
+        raise LiveError(where, expected, "none", "calibrate the building, and name it under `model`")
+    recorded = _recorded(site.folder, begin, end)
+    times = sorted(recorded.now)
+    steps = round((times[-1] - times[0]) / site.step) + 1 if times else 0
+    expected, found = "a day of the controller's plans with their forecasts", f"{steps or 'no'} steps"
+    LiveError.unless(steps * site.step >= DAY, f"{site.folder}", expected, found, "let it run in shadow")
+    first = times[0]
+    building, system, parameters = believed(site, entry)
+    step = MODEL_STEP if site.step % MODEL_STEP == 0.0 else site.step
+    gains = "internal_gains" not in model_settings(parameters).effects  # which the model has itself otherwise
+    scenario = _scenario(site, building, recorded, first, steps, step, gains)
+    plant = SimulatedPlant(
+        scenario, system, ReducedBuilding(control_model(building, parameters), step_seconds=step),
+        control_steps=round(site.step / step), noise=SensorNoise(), warm_up_days=_WARM_UP, seed=_SEED,
+    )  # fmt: skip
+    own = OutdoorReset([a for a in plant.actuators if a.required], building.weather_station, own_rule(entry))
+    usual = {f"{building.weather_station}/{OUTDOOR_TEMPERATURE}": float(scenario.outdoor.mean())}
+    plant.default_actions = plant.default_actions | own.step(usual, None)
+    tell = progress or (lambda stage, done, total: None)
+    runs = []
+    for number, acts in enumerate((False, True)):
+        chosen = Planner(site, controller).controller if acts else None
+        seen = plant.reset(_SEED)
+        for k in range(steps):
+            actions = own.step(seen, None)
+            if chosen is not None:
+                planned = chosen.step(seen, recorded.forecasts.get(first + k * site.step))
+                actions |= {name: value for name, value in planned.items() if name in site.writable}
+            seen = plant.step(actions)
+            tell("rehearse", number * steps + k + 1, 2 * steps)
+        runs.append(by_day(plant.record(), scenario))
+    days = runs[1].join(runs[0].add_prefix("own_"))
+    days = days.assign(promised=_promised(recorded, site.plant.location.timezone))
+    return Rehearsal(site.file.name, days, _currency(site), steps, steps - len(recorded.forecasts))
+
+
+def _recorded(folder: Path, begin: pd.Timestamp | None, end: pd.Timestamp | None) -> _Recorded:
+    """Read the controller's logs; a line that cannot be read is left out, as the log is not judged here."""
+    low = -math.inf if begin is None else begin.timestamp()
+    high = math.inf if end is None else end.timestamp()
+    past, found = dict[float, dict[str, Any]](), _Recorded([], {}, {}, {})
+    for path in log_files(folder, "controller"):
+        with path.open("rb") as lines:
+            for line in lines:
+                if b'"kind":"plan"' not in line:
+                    continue
+                try:
+                    content = json.loads(line)["content"]
+                    inputs, plan = content["inputs"], content["plan"]
+                    at, forecast = float(inputs["begin"]), inputs["forecast"]
+                    if not low <= at < high or forecast is None:
+                        continue
+                    row = dict(zip(forecast["columns"], (values[0] for values in forecast["values"]), strict=True))
+                    found.forecasts[at] = forecast_of_dict(forecast)
+                except (ValueError, KeyError, TypeError, IndexError):
+                    continue
+                found.now[at] = row
+                weather = {name: row.get(name) for name in WEATHER_POINTS if name in row}
+                past[at] = {"begin": at, "means": inputs["means"], "ahead": weather}
+                rule = (plan.get("ahead") or {}).get("rule")
+                if rule is not None:
+                    found.rules[at] = float(rule["rule"]), float(rule["saving"])
+    found.past.extend(past[at] for at in sorted(past))
+    return found
+
+
+def _scenario(
+    site: Site, building: Building, recorded: _Recorded, first: float, steps: int, step: float, gains: bool
+) -> Scenario:
+    """Lay out what drove the days, on the model's steps; what was not recorded stays as it was the step before."""
+    zone, zones, each = site.plant.location.timezone, building.zone_names, round(site.step / step)
+    grid = StepGrid(pd.Timestamp(first, unit="s", tz="UTC").tz_convert(zone), step, steps * each)
+    times = first + site.step * np.arange(steps)
+    now = pd.DataFrame.from_dict(recorded.now, orient="index", dtype=float).reindex(times).ffill().bfill()
+
+    def rows(*names: str) -> FloatArray:
+        missing = [name for name in names if name not in now or now[name].isna().any()]
+        LiveError.unless(not missing, f"{site.folder}: forecasts", ", ".join(names[:3]), f"no {', '.join(missing[:3])}")
+        return np.repeat(now[list(names)].to_numpy(), each, axis=0)
+
+    def of_zones(kind: str) -> FloatArray:
+        return rows(*(f"{name}/{kind}" for name in zones))
+
+    def price(of: str) -> FloatArray:
+        return rows(f"{of}_price")[:, 0] if f"{of}_price" in now else np.zeros(grid.n_steps)
+
+    station = building.weather_station
+    seen = past_table(recorded.past, first + (steps + 1) * site.step, site.step, zone, station)
+    named = {f"{station}/{point}": point for point in WEATHER_POINTS if f"{station}/{point}" in seen}
+    measured = seen[list(named)].rename(columns=named).interpolate(limit_direction="both")
+    weather = Weather(measured.iloc[-steps:], building.location, step=site.step).on(grid)
+    nobody = np.zeros((grid.n_steps, len(zones)))
+    carbon = np.zeros(grid.n_steps)
+    given = gains and f"{zones[0]}/internal_gain" in now
+    heat = SeriesGains(sensible=0.0, latent=0.0, others=of_zones("internal_gain") if given else nobody)
+    return Scenario(
+        building, grid, zone_areas(building), np.zeros(len(zones)), weather, occupancy=nobody,
+        expected_occupancy=nobody, lower=of_zones("comfort_lower_temperature"),
+        upper=of_zones("comfort_upper_temperature"), electricity_price=price("electricity"), gas_price=price("gas"),
+        electricity_carbon=carbon, gas_carbon=carbon, demand=(), currency=_currency(site), carbon_kind="",
+        people=ScheduledOccupancy(dict.fromkeys(zones, 0.0)), heat=heat,
+    )  # fmt: skip
+
+
+def _currency(site: Site) -> str:
+    return "" if site.plant.prices is None else site.plant.prices.currency
+
+
+def _promised(recorded: _Recorded, timezone: str) -> pd.Series:
+    """Share that the plans of a day expect to save, weighted by what the rule costs over their horizons [-]."""
+    index = pd.to_datetime(list(recorded.rules), unit="s", utc=True).tz_convert(timezone)
+    table = pd.DataFrame(list(recorded.rules.values()), index=index, columns=["rule", "saving"])
+    table["saved"] = table["rule"] * table["saving"]
+    daily = table.resample("1D").sum()
+    return daily["saved"] / daily["rule"].where(daily["rule"] > 0.0)
