@@ -33,7 +33,9 @@ from newcomer_live import free_port
 
 from mpc.live.audit import read_log
 from mpc.live.page.metrics import process_use
+from mpc.live.rehearsal import rehearse
 from mpc.live.replay import replay_log
+from mpc.live.site import Site
 from mpc.loop.make import save_pilot
 from thermal.pilot.building import pilot_building
 
@@ -149,14 +151,17 @@ class Week:
         plans = [entry["content"] for file in sorted(logs.glob("controller-*.jsonl"))
                  for _, entry in read_log(file, None) if entry["kind"] == "plan"]  # fmt: skip
         replays = [replay_log(file, path) for file in sorted(logs.glob("*.jsonl"))]
-        seconds = sum(self.days) * 86400.0
+        seconds, site = sum(self.days) * 86400.0, Site(path)
+        begin = pd.Timestamp(self.site.first, unit="s", tz="UTC")
+        acting = begin + pd.Timedelta(days=sum(self.days[:2]))
+        rehearsed = {"all": rehearse(site, begin), "acting": rehearse(site, acting)}
         by_part: dict[str, list[float]] = {}
         for name, cpu, memory in self.uses.values():
             total = by_part.setdefault(name, [0.0, 0.0, 0])
             by_part[name] = [total[0] + cpu / seconds, max(total[1], memory), total[2] + 1]
         return {
             "acted": acted.reset_index(drop=True).to_dict("list"), "own": own.reset_index(drop=True).to_dict("list"),
-            "predicted": _predicted(plans, self.site.first), "plans": len(plans),
+            "rehearsed": {name: one.to_dict() for name, one in rehearsed.items()}, "plans": len(plans),
             "planned": sum(p["plan"]["status"] == "planned" for p in plans),
             "troubles": _counted(p["plan"]["status"] for p in plans if p["plan"]["status"] != "planned"),
             "parts": by_part, "lines": sum(r.lines for r in replays), "decisions": sum(r.decisions for r in replays),
@@ -167,19 +172,6 @@ class Week:
 
 
 OWN_AIR, OWN_WATER = OWN.values()
-
-
-def _predicted(plans: list[dict[str, Any]], first: float) -> list[list[float]]:
-    """Cost of the rule and what the plan saves of it, summed over the plans of each day [currency]."""
-    days: dict[int, list[float]] = {}
-    for plan in plans:
-        ahead = plan["plan"].get("ahead")
-        rule = None if ahead is None else ahead["rule"]
-        if rule is not None:
-            total = days.setdefault(int((plan["inputs"]["begin"] - first) // 86400.0), [0.0, 0.0])
-            total[0] += rule["rule"]
-            total[1] += rule["rule"] * rule["saving"]
-    return [[day, *total] for day, total in sorted(days.items())]
 
 
 def _counted(words: Any) -> dict[str, int]:
@@ -215,27 +207,24 @@ def _percent(share: float) -> str:
 def tables(found: Mapping[str, Any]) -> str:
     """Lay out what was found."""
     acted, own, (shadow, advise, _) = found["acted"], found["own"], found["days"]
-    ahead = {day: (rule, saved) for day, rule, saved in found["predicted"]}
-    rows = []
+    ahead, rows = found["rehearsed"]["all"]["days"], []
     for k in range(sum(found["days"])):
         mode = "shadow" if k < shadow else "advise" if k < shadow + advise else "act"
-        rule, saved = ahead.get(k, (0.0, 0.0))
         rows.append([
             f"{pd.Timestamp(START) + pd.Timedelta(days=k):%A}", mode, f"{own['cost'][k]:.1f}",
             f"{acted['cost'][k]:.1f}", _percent(1.0 - acted["cost"][k] / own["cost"][k]),
-            _percent(saved / rule) if rule else "-", f"{own['discomfort'][k]:.1f}, {acted['discomfort'][k]:.1f}",
+            *(_percent(ahead[k][of]) if ahead[k][of] is not None else "-" for of in ("saving", "promised")),
+            f"{own['discomfort'][k]:.1f}, {acted['discomfort'][k]:.1f}",
         ])  # fmt: skip
-    heads = ["day", "mode", "own control [USD]", "as operated [USD]", "saved", "saved by the plans' own prediction",
-             "outside the bands, own and operated [K h]"]  # fmt: skip
-    foreseen = [ahead[k] for k in range(shadow) if k in ahead]
-    predicted = sum(s for _, s in foreseen) / sum(r for r, _ in foreseen)
-    acting = slice(shadow + advise, None)
+    heads = ["day", "mode", "own control [USD]", "as operated [USD]", "saved", "rehearsed from the first day on",
+             "promised by plans", "outside the bands, own and operated [K h]"]  # fmt: skip
+    rehearsed, acting = found["rehearsed"]["acting"]["saving"], slice(shadow + advise, None)
     realised = 1.0 - sum(acted["cost"][acting]) / sum(own["cost"][acting])
     uses, samples = found["parts"], found["samples"]
     parts = [[name, _percent(cpu), f"{memory / 1e6:.0f}", n] for name, (cpu, memory, n) in uses.items()]
     whole = _percent(sum(cpu for cpu, *_ in uses.values())), f"{sum(m for _, m, _ in uses.values()) / 1e6:.0f}"
     told = (
-        f"Predicted in shadow {_percent(predicted)}, saved in act {_percent(realised)}. {found['planned']} of "
+        f"Days of acting rehearsed {_percent(rehearsed)}, saved {_percent(realised)}. {found['planned']} of "
         f"{found['plans']} plans were made. {found['points']} points, {samples['readings']} readings "
         f"{samples['between']:.0f} s apart (median), {samples['samples']:,.0f} samples, {samples['stored']:,.0f} of "
         f"them committed at once; {found['decisions']:,} decisions and plans on {found['lines']:,} lines of logs "
