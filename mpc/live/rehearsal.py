@@ -37,7 +37,7 @@ from mpc.model import control_model, model_settings
 from mpc.scenario.forecast import Forecast
 from mpc.scenario.grid import StepGrid
 from mpc.scenario.occupancy import ScheduledOccupancy
-from mpc.scenario.scenario import Scenario, zone_areas
+from mpc.scenario.scenario import OCCUPANCY_POINT, Scenario, zone_areas
 from mpc.scenario.weather import WEATHER_POINTS, Weather
 from mpc.studies.optimal_control import MODEL_STEP
 from thermal._types import FloatArray
@@ -245,13 +245,13 @@ def _scenario(
     named = {f"{station}/{point}": point for point in WEATHER_POINTS if f"{station}/{point}" in seen}
     measured = seen[list(named)].rename(columns=named).interpolate(limit_direction="both")
     weather = Weather(measured.iloc[-steps:], building.location, step=site.step).on(grid)
-    nobody = np.zeros((grid.n_steps, len(zones)))
-    carbon = np.zeros(grid.n_steps)
+    nothing, carbon = np.zeros((grid.n_steps, len(zones))), np.zeros(grid.n_steps)
     given = gains and f"{zones[0]}/internal_gain" in now
-    heat = SeriesGains(sensible=0.0, latent=0.0, others=of_zones("internal_gain") if given else nobody)
+    heat = SeriesGains(sensible=0.0, latent=0.0, others=of_zones("internal_gain") if given else nothing)
+    people = of_zones(OCCUPANCY_POINT) if f"{zones[0]}/{OCCUPANCY_POINT}" in now else nothing
     return Scenario(
-        building, grid, zone_areas(building), np.zeros(len(zones)), weather, occupancy=nobody,
-        expected_occupancy=nobody, lower=of_zones("comfort_lower_temperature"),
+        building, grid, zone_areas(building), np.zeros(len(zones)), weather, occupancy=people,
+        expected_occupancy=people, lower=of_zones("comfort_lower_temperature"),
         upper=of_zones("comfort_upper_temperature"), electricity_price=price("electricity"), gas_price=price("gas"),
         electricity_carbon=carbon, gas_carbon=carbon, demand=(), currency=_currency(site), carbon_kind="",
         people=ScheduledOccupancy(dict.fromkeys(zones, 0.0)), heat=heat,
