@@ -176,7 +176,7 @@ def rehearse(
     runs = []
     for number, acts in enumerate((False, True)):
         chosen = Planner(site, controller).controller if acts else None
-        seen = plant.reset(_SEED)
+        seen = plant.reset()  # without a seed, which would draw other people than those on record
         for k in range(steps):
             actions = own.step(seen, None)
             if chosen is not None:
