@@ -171,7 +171,7 @@ def _chances(diagnosis: Diagnosis) -> list[tuple[float, Fit]]:
     judged = {c.effect: c.probability for c in diagnosis.verdict.candidates}
     found, real = list[tuple[float, Fit]](), 1.0
     for r in diagnosis.rounds:
-        if r.accepted is None:
+        if r.accepted is None or real == 0.0:  # nothing is known to follow what is not there
             break
         share, none = probabilities(levelled(r), accepted_from(r.own))
         own = r.accepted.screened.effect

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import time
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -11,12 +10,9 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
 import yaml
-from typer.testing import CliRunner
 
-from mpc.cli.app import app
 from mpc.errors import LiveError, PlantError
 from mpc.live.audit import AuditLog
 from mpc.live.clock import set_clock
@@ -24,7 +20,6 @@ from mpc.live.links.make import make_links
 from mpc.live.outlook import Outlook
 from mpc.live.past import recent_past
 from mpc.live.planner import Planner, forecast_to_dict, needed_columns
-from mpc.live.rehearsal import rehearse
 from mpc.live.site import Site
 from mpc.scenario.forecast import Forecast
 
@@ -167,53 +162,11 @@ def test_what_a_device_is_told_becomes_a_value_of_the_actuator(script: Callable[
     assert [taken(switch, value) for value in (0.4, 0.6, 7.0)] == [0.0, 1.0, 1.0]
 
 
-def check_rehearsal(site: Site, plant: Any, out: Path) -> None:
-    """A recorded day is run through anew: the own control costs by the model about what it did in the building."""
-    log, each, zone = AuditLog(site.folder, "controller", 0.0), round(site.step / plant.control_step), "Etc/GMT+8"
-    seen, columns = [plant.reset()], plant.columns
-    for _ in range(96):
-        means = dict(zip(columns, np.mean([s.values_array for s in seen], axis=0).tolist(), strict=True))
-        inputs = {"begin": seen[-1].seconds, "means": means, "forecast": forecast_to_dict(plant.forecast())}
-        log.append("plan", {"inputs": inputs, "plan": {"ahead": {"rule": {"rule": 2.0, "plan": 1.0, "saving": 0.25}}}})
-        seen = [plant.step({}) for _ in range(each)]
-    log.close()
-    made = CliRunner().invoke(app, ["rehearse", str(site.path), "--out", str(out), "--json"])
-    assert made.exit_code == 0, made.output
-    told, done = json.loads(made.stdout), plant.bought().iloc[0]
-    (day,) = told["days"]
-    assert (told["steps"], told["lost"], told["promised"], day["day"]) == (96, 0, 0.25, "2023-01-09")
-    assert day["own_cost"] == pytest.approx(done["cost"], rel=0.3)
-    assert day["own_energy"] == pytest.approx(done["energy"], rel=0.3)
-    assert 0.0 < told["saving"] == pytest.approx(1.0 - day["cost"] / day["own_cost"])
-    assert "On this day acting would have saved" in (out / "report.html").read_text(encoding="utf-8")
-    assert pd.read_parquet(out / "days.parquet")["cost"].iloc[0] == day["cost"]
-    begin = pd.Timestamp("2023-01-09T12:00", tz=zone)
-    with pytest.raises(LiveError, match="a day of the controller's plans with their forecasts, found 48 steps"):
-        rehearse(site, begin)
-    with pytest.raises(LiveError, match="found no steps"):
-        rehearse(site, begin + pd.DateOffset(years=1))
-
-
 def test_an_office_with_air_handlers_is_a_site_and_is_planned_by_its_building(
-    script: Callable[[str], ModuleType], tmp_path: Path
+    office_site: Callable[[float], Any], tmp_path: Path
 ) -> None:
-    from mpc.loop.make import save_pilot
-    from thermal.pilot.building import pilot_building
-
-    pytest.importorskip("rusty_bacnet", reason="needs a BACnet device of another stack: pip install rusty-bacnet")
-    pytest.importorskip("bacpypes3", reason="needs the extra [live]")
-    for name in ("_bacnet_device", "_site_files", "_plant_site"):
-        script(name)
-    pilot = script("_pilot_site")
-    building = pilot_building(1, floor_area=200.0, zones=4, name="office")
-    plant = pilot.OwnControl(building, "2023-01-09", 1.0, 1)
-    save_pilot(tmp_path / "case", building, plant.settings, start="2023-01-08", days=1, setpoints=pilot.OWN)
-    own = {"air": ["13 degC", "13 degC"], "water": ["75 degC", "75 degC"]}
-    model = {"building": "../case", "own_control": own}
-    file, plant_site = plant.described("office", "2023-01-09"), script("_plant_site").PlantSite
-    device = plant_site(file, plant, tmp_path / "site", 1.001, pilot.CONTROL_STEP)
+    device, plant, path = office_site(0.2)
     try:
-        path = device.begin("postgresql:///none", more={"controller": "mpc", "model": model})
         site = Site(path)
         check_plan(device, site)
         outlook = Outlook(site.plant_path, site.plant).at(device.time)
@@ -253,7 +206,6 @@ def test_an_office_with_air_handlers_is_a_site_and_is_planned_by_its_building(
         water = "BOILER/supply_water_temperature_setpoint"
         seen = operated(device, site, water, 330.0)
         assert seen == pytest.approx((348.15, 330.0, 348.15))
-        check_rehearsal(site, plant, tmp_path / "rehearsed")
 
         told = yaml.safe_load(path.read_text())
         told["model"]["own_control"]["cold"] = "20 degC"

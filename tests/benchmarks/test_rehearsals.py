@@ -1,0 +1,81 @@
+"""Rehearsals: a recorded day in closed loop with the site's model, under its weather, people, prices and forecasts."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+from typer.testing import CliRunner
+
+from calibration.evaluation.settings import ModelSettings
+from mpc.cli.app import app
+from mpc.errors import LiveError
+from mpc.live.audit import AuditLog
+from mpc.live.planner import forecast_to_dict
+from mpc.live.rehearsal import rehearse
+from mpc.live.site import Site
+from mpc.loop.run import FixedSetpoints
+from thermal.case.load import load_building
+
+
+def record_a_day(site: Site, plant: Any) -> None:
+    """Log plans of a day under the building's own control, with what they rest on."""
+    log, each = AuditLog(site.folder, "controller", 0.0), round(site.step / plant.control_step)
+    seen, columns = [plant.reset()], plant.columns
+    for _ in range(96):
+        means = dict(zip(columns, np.mean([s.values_array for s in seen], axis=0).tolist(), strict=True))
+        inputs = {"begin": seen[-1].seconds, "means": means, "forecast": forecast_to_dict(plant.forecast())}
+        log.append("plan", {"inputs": inputs, "plan": {"ahead": {"rule": {"rule": 2.0, "plan": 1.0, "saving": 0.25}}}})
+        seen = [plant.step({}) for _ in range(each)]
+    log.close()
+
+
+def test_a_recorded_day_is_run_through_anew(office_site: Callable[[float], Any], tmp_path: Path) -> None:
+    """The own control costs by the model about what it did in the building."""
+    device, plant, path = office_site(1.0)
+    device.stop()
+    site, out = Site(path), tmp_path / "rehearsed"
+    record_a_day(site, plant)
+    made = CliRunner().invoke(app, ["rehearse", str(site.path), "--out", str(out), "--json"])
+    assert made.exit_code == 0, made.output
+    told, done = json.loads(made.stdout), plant.bought().iloc[0]
+    (day,) = told["days"]
+    assert (told["steps"], told["lost"], told["promised"], day["day"]) == (96, 0, 0.25, "2023-01-09")
+    assert day["own_cost"] == pytest.approx(done["cost"], rel=0.3)
+    assert day["own_energy"] == pytest.approx(done["energy"], rel=0.3)
+    assert 0.0 < told["saving"] == pytest.approx(1.0 - day["cost"] / day["own_cost"])
+    assert "On this day acting would have saved" in (out / "report.html").read_text(encoding="utf-8")
+    assert pd.read_parquet(out / "days.parquet")["cost"].iloc[0] == day["cost"]
+    begin = pd.Timestamp("2023-01-09T12:00", tz="Etc/GMT+8")
+    with pytest.raises(LiveError, match="a day of the controller's plans with their forecasts, found 48 steps"):
+        rehearse(site, begin)
+    with pytest.raises(LiveError, match="found no steps"):
+        rehearse(site, begin + pd.DateOffset(years=1))
+
+
+def own_cost(site: Site, gain: float) -> float:
+    """Rehearse with a model that has people's heat [W/m2] as an effect; cost of the building's own control."""
+    effects = {"internal_gains": ()}
+    building = load_building(site.path.parent / "../case")
+    values = {p.name: p.start for p in ModelSettings(effects=effects).network(building).parameters}
+    content = {"parameters": values | {"internal_gain": gain}, "settings": {"effects": {"internal_gains": []}}}
+    (site.path.parent / "model.json").write_text(json.dumps(content))
+    told = yaml.safe_load(site.path.read_text())
+    other = site.path.with_name("other.yaml")
+    other.write_text(yaml.safe_dump(told | {"model": told["model"] | {"parameters": "model.json"}}))
+    return float(rehearse(Site(other), controller=FixedSetpoints({}, ())).days["own_cost"].sum())
+
+
+@pytest.mark.long
+def test_people_of_the_recorded_day_drive_the_effects_of_the_model(office_site: Callable[[float], Any]) -> None:
+    device, plant, path = office_site(1.0)
+    device.stop()
+    site = Site(path)
+    record_a_day(site, plant)
+    assert own_cost(site, 25.0) < 0.8 * own_cost(site, 0.0)
