@@ -106,7 +106,7 @@ class DisturbanceModel:
         --------
         >>> heat = DisturbanceModel(100.0, 3600.0, 0.05).drawn(300.0, 100_000, 1, np.random.default_rng(0))
         >>> round(heat.std())
-        101
+        100
         """
         keep, added = self.discrete(step)
         shocks = rng.standard_normal((n_steps, n_zone))

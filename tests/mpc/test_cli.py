@@ -18,7 +18,7 @@ CASE = str(bundled_case_path())
 EPILOGS = (
     *("check", "simulate", "evaluate", "calibrate", "diagnose", "demo", "doctor", "import-plan", "import-devices"),
     *("control", "compare", "serve", "label", "import-telemetry", "effects", "experiment", "monitor", "identify"),
-    *("discover", "verify", "priors", "operate", "replay"),
+    *("discover", "verify", "priors", "operate", "rehearse", "replay"),
 )
 
 

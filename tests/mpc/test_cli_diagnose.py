@@ -33,7 +33,7 @@ def test_diagnose_writes_what_it_says(coarse_case: Path, tmp_path: Path) -> None
     assert answer.exit_code == 0, answer.stderr
     assert json.loads(answer.stdout) == json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
     assert sorted(p.name for p in out.iterdir()) == [
-        "calibration.json", "diagnosis.json", "missing_watts.parquet", "predictions.parquet", "report.html",
+        "calibration.json", "diagnosis.json", "missing_watts.parquet", "posterior.json", "predictions.parquet", "report.html",
     ]  # fmt: skip
     held_out = json.loads(answer.stdout)["intervals"]["held_out"]
     assert [i["start"] for i in held_out] == ["2023-03-07T00:30:00-05:00"]
