@@ -14,7 +14,7 @@ from calibration.diagnosis.free import Free, drawing_fails, held_against, search
 from calibration.diagnosis.handed_on import other_structures
 from calibration.diagnosis.known import reasons_of
 from calibration.diagnosis.refit.challenge import challenge
-from calibration.diagnosis.refit.comparison import ModelComparison
+from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.diagnosis.refit.how_far import Step, how_far
 from calibration.diagnosis.refit.refit import HeldOut, elsewhere, held_out
 from calibration.diagnosis.refit.search import Round, search
@@ -27,6 +27,7 @@ from calibration.fit.left_out import LeftOut
 from calibration.fit.result import Rung
 from calibration.progress import Forward, Progress
 from calibration.results import plain
+from calibration.stages import stage
 from thermal.case.case import Case
 from thermal.case.plausibility.examine import check_calibratable
 from thermal.effects.catalogue import CATALOGUE
@@ -174,11 +175,35 @@ def seek(
     whole = Forward(progress)
     faults = mend(case, tune, hold_out, {"dx": dx, "horizon": horizon}, whole.part(0.1, "telemetry"))
     case = faults[-1].mended if faults else case
-    drawn = models = ModelComparison(case, ModelSettings(dx=dx), tune, hold_out, horizon)
-    untestable = models.untestable()
+    drawn = ModelComparison(case, ModelSettings(dx=dx), tune, hold_out, horizon)
+    untestable = drawn.untestable()
     untestable |= reasons_of(known, ruled_out, untestable)
-    effects: dict[str, tuple[str, ...]] = {name: () for name in known}
     whole.say("baseline")
+    begun = stage("baseline", lambda: _begin(drawn, {name: () for name in known}, whole))
+    models, baseline, errors, last_third = begun
+    testable = [e for e in CATALOGUE if e not in untestable]
+    rounds = search(models, baseline, errors, testable, whole.part(0.5))
+    models, rounds = stage(
+        "masses by zone", lambda: challenge(models, rounds, testable, whole.part(0.3, "masses by zone"))
+    )
+    about = _About(models, rounds, untestable)
+    if judge(rounds, untestable).name != "no_gap":
+        about = stage("structures", lambda: _other_structures(about, known, ruled_out, whole))
+    models, rounds, untestable, structures, free, left_over = about
+    steps, floor = how_far(models, rounds)
+    verdict = doubted(judge(rounds, untestable, left_over), {s.effects[-1] for s in steps if s.void})
+    if free is not None and structures is not None:
+        verdict = with_recurring(verdict, free, structures.rungs)
+    return Sought(
+        case, models, rounds, with_faults(verdict, faults), steps, floor, structures, free, left_over,
+        faults, last_third, time.process_time() - began,
+    )  # fmt: skip
+
+
+def _begin(
+    drawn: ModelComparison, effects: dict[str, tuple[str, ...]], whole: Forward
+) -> tuple[ModelComparison, Fit, HeldOut, float | None]:
+    """Fit the baseline, on days that alternate where the last third is another world; also what it erred by there."""
     models, baseline = fit_baseline(drawn, effects, whole.part(0.2, "baseline"))
     first = errors = held_out(models, baseline)
     turns = elsewhere(baseline, first) and models.alternate(baseline.built.inputs)
@@ -187,29 +212,33 @@ def seek(
         other_days = replace(drawn, tune=models.tuned, hold_out=models.judged)
         models, baseline = fit_baseline(other_days, effects, whole.part(0.2, "baseline"))
         errors = held_out(models, baseline)
-    testable = [e for e in CATALOGUE if e not in untestable]
-    rounds = search(models, baseline, errors, testable, whole.part(0.5))
-    models, rounds = challenge(models, rounds, testable, whole.part(0.3, "masses by zone"))
-    about_drawing = judge(rounds, untestable).name
-    structures, free, left_over = None, None, None
-    if about_drawing != "no_gap":
-        # a drawing that is known to lack what nothing explains has no advance
-        advance = 0.0 if about_drawing == "unexplained" else ADVANCE
-        for fit in held_against(rounds, case.building.geometry_quality):
-            structures = Structures(*other_structures(models, fit, whole.part(0.5), advance))
-            if structures.kept is not None and drawing_fails(structures.rungs, structures.kept):  # names make up for it
-                free = search_free(models, structures.kept, known, ruled_out, whole.part(0.6, "free structure"))
-                models, rounds, untestable, left_over = free.models, free.rounds, free.untestable, free.left_over
-                structures = structures._replace(kept=free.kept)
-                break
-        small = not is_large(case.building.zone_names)
-        if free is None and about_drawing == "unexplained" and rounds[0].accepted and small:
-            left_over = regular(models, rounds[-1].after)
-    steps, floor = how_far(models, rounds)
-    verdict = doubted(judge(rounds, untestable, left_over), {s.effects[-1] for s in steps if s.void})
-    if free is not None and structures is not None:
-        verdict = with_recurring(verdict, free, structures.rungs)
-    return Sought(
-        case, models, rounds, with_faults(verdict, faults), steps, floor, structures, free, left_over,
-        faults, first.mae if turns else None, time.process_time() - began,
-    )  # fmt: skip
+    return models, baseline, errors, first.mae if turns else None
+
+
+class _About(NamedTuple):
+    """What a verdict is about: the models that were compared and what was found of them."""
+
+    models: ModelComparison
+    rounds: tuple[Round, ...]
+    untestable: dict[str, str]
+    structures: Structures | None = None
+    free: Free | None = None
+    left_over: Regular | None = None
+
+
+def _other_structures(about: _About, known: Sequence[str], ruled_out: Sequence[str], whole: Forward) -> _About:
+    """Hold other structures against a drawing that lacks something, and seek effects about a free one."""
+    models, rounds, case = about.models, about.rounds, about.models.case
+    unexplained = judge(rounds, about.untestable).name == "unexplained"
+    # a drawing that is known to lack what nothing explains has no advance
+    advance = 0.0 if unexplained else ADVANCE
+    for fit in held_against(rounds, case.building.geometry_quality):
+        structures = Structures(*other_structures(models, fit, whole.part(0.5), advance))
+        about = about._replace(structures=structures)
+        if structures.kept is not None and drawing_fails(structures.rungs, structures.kept):  # names make up for it
+            free = search_free(models, structures.kept, known, ruled_out, whole.part(0.6, "free structure"))
+            structures = structures._replace(kept=free.kept)
+            return _About(free.models, free.rounds, free.untestable, structures, free, free.left_over)
+    if unexplained and rounds[0].accepted and not is_large(case.building.zone_names):
+        return about._replace(left_over=regular(models, rounds[-1].after))
+    return about

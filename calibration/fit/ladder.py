@@ -14,6 +14,7 @@ from calibration.fit.left_out import Fitted, Known, LeftOut, begin_at, left_out
 from calibration.fit.problem import tuning_problem
 from calibration.fit.result import CalibrationResult, Rung
 from calibration.progress import Forward, Progress
+from calibration.stages import stage
 from thermal.case.case import Case
 from thermal.case.emitters import Unknown, unknown_heaters
 from thermal.inputs.provider import telemetry_inputs
@@ -257,9 +258,13 @@ class _Ladder:
     def solve(self, settings: CalibrationSettings, known: Fitted | None = None) -> FittedCase:
         """Fit a structure."""
         given, part = self.given, self.progress.part(_SHARE, "another structure")
-        found = fit_case(given.case, given.tuned, given.judged, settings, part, known)
-        found.raise_if_interrupted()
-        return found
+
+        def solved() -> FittedCase:
+            found = fit_case(given.case, given.tuned, given.judged, settings, part, known)
+            found.raise_if_interrupted()
+            return found
+
+        return stage("structure", solved)
 
     @property
     def guesses(self) -> bool:

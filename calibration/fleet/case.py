@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import shutil
 import socket
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -17,6 +18,9 @@ from calibration.fleet.task import Task
 from calibration.results import Content, write_results
 from thermal.case.load import NAME, read_building_file
 from thermal.errors import CaseError
+
+#: Folder of the results that holds ends of stages of the cases that are not finished.
+STAGES = ".stages"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,6 +70,34 @@ class CaseTask(Task):
     def survived(self) -> None:
         """Keep the marks: they go with the run."""
 
+    def read_stage(self, name: str) -> bytes | None:
+        """Read what a stage of the case ended with; None where no attempt came so far.
+
+        Parameters
+        ----------
+        name : str
+            Of a file.
+        """
+        try:
+            return (self._stages / name).read_bytes()
+        except OSError:
+            return None
+
+    def keep_stage(self, name: str, content: bytes) -> None:
+        """Keep what a stage of the case ended with, whole or not at all, until it has results.
+
+        Parameters
+        ----------
+        name : str
+            Of a file.
+        content : bytes
+            For a later attempt.
+        """
+        self._stages.mkdir(parents=True, exist_ok=True)
+        new = self.running / f"{self.name}-{name}"
+        new.write_bytes(content)
+        new.replace(self._stages / name)
+
     def finished(self) -> CaseOutcome | None:
         """Find results of this run."""
         there = read_record(self.out)
@@ -87,6 +119,9 @@ class CaseTask(Task):
         self._check_running()  # a cluster cannot stop what it has begun when a run is interrupted
         work = None if self.out.is_symlink() else self.running  # the run clears it away, also after a killed worker
         write_results(self.out, files, self.force, work)
+        shutil.rmtree(self._stages, ignore_errors=True)
+        with suppress(OSError):  # of other cases
+            self._stages.parent.rmdir()
 
     def _check_running(self) -> None:
         """Refuse to work where the run cannot be seen, or for a run that is over."""
@@ -95,6 +130,10 @@ class CaseTask(Task):
                 f"{self.running}: expected on worker {socket.gethostname()} as where the run was started, and not "
                 "found; cases and results must lie on a file system that every worker sees under the same path"
             )
+
+    @property
+    def _stages(self) -> Path:
+        return self.out.parent / STAGES / self.name
 
     @property
     def _starts(self) -> Path:

@@ -16,6 +16,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from calibration.errors import CalibrationError, ResultsExistError
+from calibration.fleet.case import STAGES
 from calibration.fleet.data_set import TABLES, write_data_set
 from calibration.fleet.handling import Handling
 from calibration.fleet.job import Job, Status
@@ -83,6 +84,31 @@ class RemoteTask(Task):
         """Write down that the case ended without results and without ending its worker."""
         Store(self.out).remove(f"{_BEGUN}/{self.case}")
 
+    def read_stage(self, name: str) -> bytes | None:
+        """Read what a stage of the case ended with; None where no attempt came so far.
+
+        Parameters
+        ----------
+        name : str
+            Of a file.
+        """
+        try:
+            return Store(self.out).read(f"{STAGES}/{self.case}/{name}")
+        except OSError:
+            return None
+
+    def keep_stage(self, name: str, content: bytes) -> None:
+        """Keep what a stage of the case ended with, whole or not at all, until it has results.
+
+        Parameters
+        ----------
+        name : str
+            Of a file.
+        content : bytes
+            For a later attempt.
+        """
+        Store(self.out).write(f"{STAGES}/{self.case}/{name}", content)
+
     def finished(self) -> CaseOutcome | None:
         """Find results of this run; or of an earlier one with the same key, which are taken over."""
         try:
@@ -141,6 +167,7 @@ class RemoteTask(Task):
         for name in sorted(files, key=lambda name: name == RECORD):
             store.write(f"{self.case}/{name}", content_bytes(name, files[name]))
         store.remove(f"{_BEGUN}/{self.case}")
+        store.remove(f"{STAGES}/{self.case}")
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ signatures at once, so that every pair is weighed before any model is run.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations
 from typing import Any
 
@@ -18,6 +19,7 @@ from calibration.diagnosis.screen.gains import Gain
 from calibration.diagnosis.screen.own_nulls import OwnNulls, own_nulls
 from calibration.diagnosis.screen.screen import Screening, screen
 from calibration.progress import Forward, Progress
+from calibration.stages import stage
 from thermal.effects.catalogue import CATALOGUE
 from thermal.effects.effect import ALIKE
 
@@ -140,44 +142,57 @@ def search(
     progress : callable, optional
         Called with stage, done, total.
     """
-    done: list[Round] = []
-    whole = Forward(progress)
+    whole, sought = Forward(progress), _Sought((), baseline, errors)
+    while not sought.over and len(sought.done) < ROUNDS:
+        number = len(sought.done) + 1
+        part = whole.part(_SHARE, f"round {number}")
+        sought = stage(f"round {number}", partial(_next_round, models, sought, candidates, part))
+    return sought.done
+
+
+@dataclass(frozen=True)
+class _Sought:
+    """Where the search is: rounds done, the model that the next begins with, and its held-out errors."""
+
+    done: tuple[Round, ...]
+    fit: Fit
+    errors: HeldOut
     ahead: Refit | None = None
     own: OwnNulls | None = None
-    fit = baseline
-    while len(done) < ROUNDS:
-        part = whole.part(_SHARE, f"round {len(done) + 1}")
-        part("screening", 0, 1)
-        open_ = [e for e in candidates if all(r in fit.effects for r in CATALOGUE[e].requires)]
-        made, gains, generic = screen(models, fit, open_)
-        if own is not None:
-            made.jacobian = None
-        exchanged = _exchanged(models, done, made, open_)
-        if exchanged is not None:
-            done[-2:] = [exchanged]
-            fit, errors, ahead = exchanged.after, exchanged.after_held_out, exchanged.pair
-            continue
-        work = Work(models, fit, errors, made, ACCEPTED if own is None else accepted_from(own))
-        part("fitting effects", 1, 4)
-        refits = _refits(work, gains, ahead)
-        part("looking at zones and pairs", 3, 4)
-        refits = look_again(work, gains, refits, _first(errors, refits))
+    over: bool = False
+
+
+def _next_round(models: ModelComparison, sought: _Sought, candidates: Sequence[str], part: Progress) -> _Sought:
+    """Screen and fit with the model of the round before, or give that round anew with what the last one accepted."""
+    done, fit, errors, ahead, own = sought.done, sought.fit, sought.errors, sought.ahead, sought.own
+    part("screening", 0, 1)
+    open_ = [e for e in candidates if all(r in fit.effects for r in CATALOGUE[e].requires)]
+    made, gains, generic = screen(models, fit, open_)
+    if own is not None:
+        made.jacobian = None
+    exchanged = _exchanged(models, done, made, open_)
+    if exchanged is not None:
+        return _Sought((*done[:-2], exchanged), exchanged.after, exchanged.after_held_out, exchanged.pair, own)
+    work = Work(models, fit, errors, made, ACCEPTED if own is None else accepted_from(own))
+    part("fitting effects", 1, 4)
+    refits = _refits(work, gains, ahead)
+    part("looking at zones and pairs", 3, 4)
+    refits = look_again(work, gains, refits, _first(errors, refits))
+    best = _first(errors, refits)
+    if own is None:
+        own = own_nulls(made, fit if best is None else best.fit, open_)
+        work = replace(work, level=accepted_from(own))
+        refits = [replace(r, counts=r.counts and r.gain > work.level) for r in refits]
         best = _first(errors, refits)
-        if own is None:
-            own = own_nulls(made, fit if best is None else best.fit, open_)
-            work = replace(work, level=accepted_from(own))
-            refits = [replace(r, counts=r.counts and r.gain > work.level) for r in refits]
-            best = _first(errors, refits)
-        chosen = _best_pair(work, gains, refits, best) if ahead is None else None
-        pair = None
-        if chosen is not None:
-            best, pair = chosen
-            refits = sorted({id(r): r for r in (*refits, best)}.values(), key=lambda r: -r.gain)
-        done.append(Round(fit, errors, made, tuple(gains), generic, tuple(refits), best, own, pair))
-        if best is None:
-            break
-        fit, errors, ahead = best.fit, best.held_out, pair
-    return tuple(done)
+    chosen = _best_pair(work, gains, refits, best) if ahead is None else None
+    pair = None
+    if chosen is not None:
+        best, pair = chosen
+        refits = sorted({id(r): r for r in (*refits, best)}.values(), key=lambda r: -r.gain)
+    done = (*done, Round(fit, errors, made, tuple(gains), generic, tuple(refits), best, own, pair))
+    if best is None:
+        return replace(sought, done=done, over=True)
+    return _Sought(done, best.fit, best.held_out, pair, own)
 
 
 def accepted_from(own: OwnNulls) -> float:

@@ -1,5 +1,7 @@
 """Diagnosis of a building whose drawing is wrong: sought about a free structure, which needs no name for that."""
 
+import re
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
@@ -17,6 +19,8 @@ from calibration.diagnosis.screen.regular import Regular, regular
 from calibration.evaluation.settings import ModelSettings
 from calibration.fit.fitted_case import FittedCase
 from calibration.fit.result import Rung
+from calibration.results import to_json
+from calibration.stages import stages_kept
 from mpc.reports.diagnosis_words import diagnosis_verdict
 from thermal import Case, Telemetry
 from thermal.case.building import GROUND, OUTDOOR, Building, Layer, Surface, ZoneEntry, ZoneTable
@@ -71,6 +75,31 @@ def test_a_wrong_drawing_is_said_to_be_wrong_and_the_search_goes_on_without_it()
     assert content["left_over"]["shares"].keys() == found.left_over.shares.keys()
     assert content["gap"]["p_value"] == chance_of(found.rounds[0])
     assert diagnosis_verdict(found).startswith("The drawing does not hold")
+
+
+class OneMore(dict[str, bytes]):
+    """Keeps one stage more than the attempt before, which ends with it."""
+
+    def read(self, name: str) -> bytes | None:
+        return self.get(name)
+
+    def write(self, name: str, content: bytes) -> None:
+        self[name] = content
+        raise ConnectionAbortedError
+
+
+@pytest.mark.long
+def test_an_attempt_after_others_were_killed_answers_the_same() -> None:
+    """Of every stage with the one before taken over from a copy."""
+    kept, attempts, answer = OneMore(), 0, None
+    while answer is None:
+        attempts += 1
+        with suppress(ConnectionAbortedError), stages_kept(kept, every=0.0):
+            answer = diagnose(Case(drawn_wrongly(twin().building), twin().telemetry))
+    assert attempts == len(kept) + 1 > 6
+    texts = (to_json(found.to_dict() | found.calibration()) for found in (answer, diagnosed()))
+    one, other = (re.sub(r'"seconds": [\d.e-]+', "", text) for text in texts)
+    assert one == other
 
 
 @pytest.mark.long
