@@ -1,9 +1,9 @@
 """What acting saves, as plans promise it, as a rehearsal on the site's model foretells it, and as it comes.
 
 Offices of 12 zones, plants of ours whose parameters are drawn, with sun and people; their own control holds 13 degC of
-supply air and 75 degC of supply water. The model is what ``buildingmpc calibrate`` makes of the two weeks before. A
-week is run in shadow, as ``operate`` would, without BACnet and database, and ``rehearse`` reads its log. Then the same
-week is run with the plans' values in force.
+supply air and 75 degC of supply water. The model is what ``buildingmpc calibrate`` makes of two weeks. A week is run in
+shadow, as ``operate`` would, without BACnet and database, and ``rehearse`` reads its log. Then the same week is run with
+the plans' values in force. Before both the building has a week under its own control.
 
 Run: ``python benchmarks/rehearsals.py --out results/rehearsals [--seeds 0-5] [--workers 2] [--publish]``; five CPU
 minutes a week. Needs ``[live]`` and ``pip install rusty-bacnet``. Writes ``rehearsals.json`` and ``.md``; resumes.
@@ -36,8 +36,9 @@ from mpc.loop.make import save_pilot
 from thermal.case.building import Building
 from thermal.pilot.building import pilot_building
 
-#: Mondays of the weeks, one after the other by seed; days before them that the model is calibrated on, and of a week.
-STARTS, BEFORE, DAYS = ("2023-01-09", "2023-04-17", "2023-11-13"), 14, 7
+#: Mondays of the weeks, one after the other by seed; days before them that the model is calibrated on, of a week, and
+#: under the building's own control before that: a plant of ours begins in a steady state, with all walls as one morning.
+STARTS, BEFORE, DAYS, RUN_IN = ("2023-01-09", "2023-04-17", "2023-11-13"), 14, 7, 7
 COLUMNS = ("office", "week of", "own control [USD]", "acting [USD]", "saved", "rehearsed", "promised by plans",
            "K h, own and acting")  # fmt: skip
 
@@ -56,6 +57,8 @@ def run_week(plant: OwnControl, site: Site, log: AuditLog | None, days: int) -> 
     """Run a week in shadow, with a log, or with the plans in force; give cost and discomfort by day."""
     planner, each = Planner(site), round(site.step / plant.control_step)
     seen = [plant.reset()]
+    for _ in range(round(RUN_IN * 86400.0 / plant.control_step)):
+        seen = [*seen, plant.step({})][-each:]
     for _ in range(round(days * 86400.0 / site.step)):
         means = np.mean([one.values_array for one in seen], axis=0)
         inputs = {"begin": float(seen[-1].seconds), "means": dict(zip(plant.columns, means.tolist(), strict=True)),
@@ -65,7 +68,7 @@ def run_week(plant: OwnControl, site: Site, log: AuditLog | None, days: int) -> 
             log.append("plan", {"inputs": inputs, "plan": plan})
         values = {} if log is not None else plan["values"]
         seen = [plant.step(values) for _ in range(each)]
-    return plant.bought()
+    return plant.bought().iloc[RUN_IN:]
 
 
 def compare(seed: int, days: int) -> dict[str, Any]:
@@ -76,7 +79,8 @@ def compare(seed: int, days: int) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         work = Path(folder)
         prepare(building, start, seed, work)
-        plant = OwnControl(building, start, days, seed)
+        begin = f"{pd.Timestamp(start) - pd.Timedelta(days=RUN_IN):%Y-%m-%d}"
+        plant = OwnControl(building, begin, RUN_IN + days, seed)
         air, water = OWN.values()
         model = {"building": str(work / "case"), "parameters": str(work / "calibrated/calibration.json"),
                  "own_control": {"air": [air] * 2, "water": [water] * 2}}  # fmt: skip

@@ -8,7 +8,7 @@ from mpc.scenario.rates import KILOWATT_HOUR
 from mpc.scenario.scenario import Scenario
 
 
-def by_day(record: PlantRecord, scenario: Scenario) -> pd.DataFrame:
+def by_day(record: PlantRecord, scenario: Scenario, since: int = 0) -> pd.DataFrame:
     """Add up a run by local day.
 
     Parameters
@@ -17,6 +17,8 @@ def by_day(record: PlantRecord, scenario: Scenario) -> pd.DataFrame:
         Of the run.
     scenario : Scenario
         That it was run on, from its first step on.
+    since : int
+        Steps at the beginning that do not count [-].
 
     Returns
     -------
@@ -33,4 +35,4 @@ def by_day(record: PlantRecord, scenario: Scenario) -> pd.DataFrame:
         "discomfort": outside.sum(axis=1) * step / 3600.0,
     }  # fmt: skip
     begins = pd.DatetimeIndex(scenario.grid.stamps[:done]) - pd.Timedelta(seconds=step)
-    return pd.DataFrame(table, index=begins).resample("1D").sum()
+    return pd.DataFrame(table, index=begins).iloc[since:].resample("1D").sum()

@@ -44,8 +44,9 @@ from thermal._types import FloatArray
 from thermal.case.building import Building
 from thermal.case.points import OUTDOOR_TEMPERATURE
 
-#: Days that the first one is run through beforehand, under the building's own control [d]: walls forget how they began.
-_WARM_UP = 3
+#: Days that the first one is run through beforehand, and then the first week, where there is one [d], under the
+#: building's own control: walls forget how they began, and have the weekend in them that a Monday has to make up for.
+_WARM_UP, _WEEK = 3, 7
 
 #: Seed of the sensors' noise.
 _SEED = 0
@@ -161,10 +162,11 @@ def rehearse(
     expected, found = "a day of the controller's plans with their forecasts", f"{steps or 'no'} steps"
     LiveError.unless(steps * site.step >= DAY, f"{site.folder}", expected, found, "let it run in shadow")
     first = times[0]
+    lead = round(_WEEK * DAY / site.step) if steps * site.step >= _WEEK * DAY else 0
     building, system, parameters = believed(site, entry)
     step = MODEL_STEP if site.step % MODEL_STEP == 0.0 else site.step
     gains = "internal_gains" not in model_settings(parameters).effects  # which the model has itself otherwise
-    scenario = _scenario(site, building, recorded, first, steps, step, gains)
+    scenario = _scenario(site, building, recorded, first, (lead, steps), step, gains)
     plant = SimulatedPlant(
         scenario, system, ReducedBuilding(control_model(building, parameters), step_seconds=step),
         control_steps=round(site.step / step), noise=SensorNoise(), warm_up_days=_WARM_UP, seed=_SEED,
@@ -177,14 +179,14 @@ def rehearse(
     for number, acts in enumerate((False, True)):
         chosen = Planner(site, controller).controller if acts else None
         seen = plant.reset()  # without a seed, which would draw other people than those on record
-        for k in range(steps):
+        for k in range(-lead, steps):
             actions = own.step(seen, None)
-            if chosen is not None:
+            if chosen is not None and k >= 0:
                 planned = chosen.step(seen, recorded.forecasts.get(first + k * site.step))
                 actions |= {name: value for name, value in planned.items() if name in site.writable}
             seen = plant.step(actions)
-            tell("rehearse", number * steps + k + 1, 2 * steps)
-        runs.append(by_day(plant.record(), scenario))
+            tell("rehearse", number * (lead + steps) + lead + k + 1, 2 * (lead + steps))
+        runs.append(by_day(plant.record(), scenario, since=lead * round(site.step / step)))
     days = runs[1].join(runs[0].add_prefix("own_"))
     days = days.assign(promised=_promised(recorded, site.plant.location.timezone))
     return Rehearsal(site.file.name, days, _currency(site), steps, steps - len(recorded.forecasts))
@@ -221,13 +223,19 @@ def _recorded(folder: Path, begin: pd.Timestamp | None, end: pd.Timestamp | None
 
 
 def _scenario(
-    site: Site, building: Building, recorded: _Recorded, first: float, steps: int, step: float, gains: bool
+    site: Site, building: Building, recorded: _Recorded, first: float, counts: tuple[int, int], step: float, gains: bool
 ) -> Scenario:
-    """Lay out what drove the days, on the model's steps; what was not recorded stays as it was the step before."""
+    """Lay out what drove the days, on the model's steps; what was not recorded stays as it was the step before.
+
+    Before them stand as many steps as the first of the counts says, which are the first ones once more.
+    """
     zone, zones, each = site.plant.location.timezone, building.zone_names, round(site.step / step)
-    grid = StepGrid(pd.Timestamp(first, unit="s", tz="UTC").tz_convert(zone), step, steps * each)
+    lead, steps = counts
+    begin = pd.Timestamp(first - lead * site.step, unit="s", tz="UTC").tz_convert(zone)
+    grid = StepGrid(begin, step, (lead + steps) * each)
+    taken = np.r_[0:lead, 0:steps]
     times = first + site.step * np.arange(steps)
-    now = pd.DataFrame.from_dict(recorded.now, orient="index", dtype=float).reindex(times).ffill().bfill()
+    now = pd.DataFrame.from_dict(recorded.now, orient="index", dtype=float).reindex(times).ffill().bfill().iloc[taken]
 
     def rows(*names: str) -> FloatArray:
         missing = [name for name in names if name not in now or now[name].isna().any()]
@@ -244,7 +252,8 @@ def _scenario(
     seen = past_table(recorded.past, first + (steps + 1) * site.step, site.step, zone, station)
     named = {f"{station}/{point}": point for point in WEATHER_POINTS if f"{station}/{point}" in seen}
     measured = seen[list(named)].rename(columns=named).interpolate(limit_direction="both")
-    weather = Weather(measured.iloc[-steps:], building.location, step=site.step).on(grid)
+    stamps = begin + pd.to_timedelta(site.step * np.arange(1, lead + steps + 1), unit="s")
+    weather = Weather(measured.iloc[-steps:].iloc[taken].set_axis(stamps), building.location, step=site.step).on(grid)
     nothing, carbon = np.zeros((grid.n_steps, len(zones))), np.zeros(grid.n_steps)
     given = gains and f"{zones[0]}/internal_gain" in now
     heat = SeriesGains(sensible=0.0, latent=0.0, others=of_zones("internal_gain") if given else nothing)
