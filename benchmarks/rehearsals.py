@@ -1,9 +1,9 @@
 """What acting saves, as plans promise it, as a rehearsal on the site's model foretells it, and as it comes.
 
 Offices of 12 zones, plants of ours whose parameters are drawn, with sun and people; their own control holds 13 degC of
-supply air and 75 degC of supply water. The model is what ``buildingmpc calibrate`` makes of two weeks. A week is run in
-shadow, as ``operate`` would, without BACnet and database, and ``rehearse`` reads its log. Then the same week is run with
-the plans' values in force. Before both the building has a week under its own control.
+supply air and 75 degC of supply water. The model is what ``buildingmpc calibrate`` makes of two weeks. A week is run
+in shadow, as ``operate`` would, without BACnet and database, and ``rehearse`` reads its log. Then the same week is run
+with the plans' values in force. Before both the building has a week under its own control.
 
 Run: ``python benchmarks/rehearsals.py --out results/rehearsals [--seeds 0-5] [--workers 2] [--publish]``; five CPU
 minutes a week. Needs ``[live]`` and ``pip install rusty-bacnet``. Writes ``rehearsals.json`` and ``.md``; resumes.
@@ -37,7 +37,7 @@ from thermal.case.building import Building
 from thermal.pilot.building import pilot_building
 
 #: Mondays of the weeks, one after the other by seed; days before them that the model is calibrated on, of a week, and
-#: under the building's own control before that: a plant of ours begins in a steady state, with all walls as one morning.
+#: under the building's own control before it: a plant of ours begins in a steady state.
 STARTS, BEFORE, DAYS, RUN_IN = ("2023-01-09", "2023-04-17", "2023-11-13"), 14, 7, 7
 COLUMNS = ("office", "week of", "own control [USD]", "acting [USD]", "saved", "rehearsed", "promised by plans",
            "K h, own and acting")  # fmt: skip

@@ -235,7 +235,7 @@ def _scenario(
     grid = StepGrid(begin, step, (lead + steps) * each)
     taken = np.r_[0:lead, 0:steps]
     times = first + site.step * np.arange(steps)
-    now = pd.DataFrame.from_dict(recorded.now, orient="index", dtype=float).reindex(times).ffill().bfill().iloc[taken]
+    now = pd.DataFrame.from_dict(recorded.now, orient="index", dtype=float).reindex(times).ffill().bfill().take(taken)
 
     def rows(*names: str) -> FloatArray:
         missing = [name for name in names if name not in now or now[name].isna().any()]
@@ -253,7 +253,7 @@ def _scenario(
     named = {f"{station}/{point}": point for point in WEATHER_POINTS if f"{station}/{point}" in seen}
     measured = seen[list(named)].rename(columns=named).interpolate(limit_direction="both")
     stamps = begin + pd.to_timedelta(site.step * np.arange(1, lead + steps + 1), unit="s")
-    weather = Weather(measured.iloc[-steps:].iloc[taken].set_axis(stamps), building.location, step=site.step).on(grid)
+    weather = Weather(measured.iloc[-steps:].take(taken).set_axis(stamps), building.location, step=site.step).on(grid)
     nothing, carbon = np.zeros((grid.n_steps, len(zones))), np.zeros(grid.n_steps)
     given = gains and f"{zones[0]}/internal_gain" in now
     heat = SeriesGains(sensible=0.0, latent=0.0, others=of_zones("internal_gain") if given else nothing)

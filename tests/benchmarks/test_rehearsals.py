@@ -24,11 +24,11 @@ from mpc.loop.run import FixedSetpoints
 from thermal.case.load import load_building
 
 
-def record_a_day(site: Site, plant: Any) -> None:
-    """Log plans of a day under the building's own control, with what they rest on."""
+def record(site: Site, plant: Any, days: int = 1) -> None:
+    """Log plans of days under the building's own control, with what they rest on."""
     log, each = AuditLog(site.folder, "controller", 0.0), round(site.step / plant.control_step)
     seen, columns = [plant.reset()], plant.columns
-    for _ in range(96):
+    for _ in range(96 * days):
         means = dict(zip(columns, np.mean([s.values_array for s in seen], axis=0).tolist(), strict=True))
         inputs = {"begin": seen[-1].seconds, "means": means, "forecast": forecast_to_dict(plant.forecast())}
         log.append("plan", {"inputs": inputs, "plan": {"ahead": {"rule": {"rule": 2.0, "plan": 1.0, "saving": 0.25}}}})
@@ -41,7 +41,7 @@ def test_a_recorded_day_is_run_through_anew(office_site: Callable[[float], Any],
     device, plant, path = office_site(1.0)
     device.stop()
     site, out = Site(path), tmp_path / "rehearsed"
-    record_a_day(site, plant)
+    record(site, plant)
     made = CliRunner().invoke(app, ["rehearse", str(site.path), "--out", str(out), "--json"])
     assert made.exit_code == 0, made.output
     told, done = json.loads(made.stdout), plant.bought().iloc[0]
@@ -77,5 +77,23 @@ def test_people_of_the_recorded_day_drive_the_effects_of_the_model(office_site: 
     device, plant, path = office_site(1.0)
     device.stop()
     site = Site(path)
-    record_a_day(site, plant)
+    record(site, plant)
     assert own_cost(site, 25.0) < 0.8 * own_cost(site, 0.0)
+
+
+@pytest.mark.long
+def test_a_monday_makes_up_for_the_weekend(office_site: Callable[[float], Any]) -> None:
+    """Of a week the building has a week behind it; a day by itself has itself behind it."""
+    device, plant, path = office_site(7.0)
+    device.stop()
+    site = Site(path)
+    record(site, plant, 7)
+    idle, monday = FixedSetpoints({}, ()), pd.Timestamp("2023-01-09", tz="Etc/GMT+8")
+    told: list[tuple[int, int]] = []
+    week = rehearse(site, controller=idle, progress=lambda _, done, total: told.append((done, total)))
+    assert (len(week.days), week.steps, week.days.index[0]) == (7, 7 * 96, monday)
+    assert told == [(k + 1, 4 * 7 * 96) for k in range(4 * 7 * 96)]
+    alone = rehearse(site, end=monday + pd.Timedelta(days=1), controller=idle)
+    assert len(alone.days) == 1
+    assert week.days["own_energy"].iloc[0] > 1.05 * alone.days["own_energy"].iloc[0]
+    np.testing.assert_allclose(week.days["energy"], week.days["own_energy"], rtol=1e-9)
