@@ -30,6 +30,9 @@ OWN = {SUPPLY_AIR: 286.15, SUPPLY_WATER: 348.15}
 #: Step of the plant, so that every point moves each minute; control step; how far forecasts reach [s].
 STEP, CONTROL_STEP, HORIZON = 60.0, 900.0, 12 * 3600.0
 
+#: Days under its own control before a week that is judged [d]: it begins in a steady state, as no building ever does.
+RUN_IN = 7
+
 
 #: What the building has beside the baseline; and the spread of its parameters about their starting values (a factor).
 EFFECTS, SPREAD = ("solar_gain",), 0.25
@@ -61,10 +64,15 @@ class OwnControl:
         Of parameters, weather, people and noise.
     step : float
         Of the plant [s].
+    run_in : int
+        Days before the start under its own control [d]: a plant of ours begins in a steady state.
     """
 
-    def __init__(self, building: Building, start: str, days: float, seed: int, step: float = STEP) -> None:
-        self.building, self.control_step = building, step
+    def __init__(
+        self, building: Building, start: str, days: float, seed: int, step: float = STEP, run_in: int = 0
+    ) -> None:
+        self.building, self.control_step, self.run_in = building, step, run_in
+        start, days = f"{pd.Timestamp(start) - pd.Timedelta(days=run_in):%Y-%m-%d}", days + run_in
         reach = round((HORIZON + (AHEAD + 1) * CONTROL_STEP) / step)
         end = (pd.Timestamp(start) + pd.Timedelta(days=days, seconds=reach * step)).isoformat()
         self.settings = PlantSettings(
@@ -73,7 +81,7 @@ class OwnControl:
         )  # fmt: skip
         weather = pilot_weather(seed, start, np.ceil(days + 1.0), step_seconds=step)
         self.plant: SimulatedPlant = simulated_plant(building, weather, start, end, self.settings)
-        self.steps, self._done = round(days * 86400.0 / step), 0
+        self.steps, self._done = round((days - run_in) * 86400.0 / step), 0
         kinds = {a.name: a.name.rpartition("/")[2] for a in self.plant.actuators}
         self.own = {name: OWN[kind] for name, kind in kinds.items() if kind in OWN}
         self.actuators: tuple[Actuator, ...] = tuple(a for a in self.plant.actuators if a.name in self.own)
@@ -94,8 +102,10 @@ class OwnControl:
 
     def reset(self, seed: int | None = None) -> Measurements:
         """Start anew, as `Plant.reset`."""
-        self._done = 0
-        return self._named(self.plant.reset(seed))
+        self._done, seen = 0, self.plant.reset(seed)
+        for _ in range(round(self.run_in * 86400.0 / self.control_step)):
+            seen = self.plant.step(self.own)
+        return self._named(seen)
 
     def step(self, actions: Mapping[str, float]) -> Measurements:
         """Take a step with what is commanded, its own setpoints for the rest, as `Plant.step`."""
@@ -140,4 +150,4 @@ class OwnControl:
 
     def bought(self) -> pd.DataFrame:
         """Cost of energy [currency], energy [kWh] and discomfort of all zones [K h] by local day."""
-        return by_day(self.record(), self.plant.scenario)
+        return by_day(self.record(), self.plant.scenario, since=round(self.run_in * 86400.0 / self.control_step))

@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from _pilot_site import CONTROL_STEP, EFFECTS, OWN, OwnControl
+from _pilot_site import CONTROL_STEP, EFFECTS, OWN, RUN_IN, OwnControl
 from _plant_site import PlantSite
 from _postgres import PostgresServer
 from _table import markdown, write
@@ -72,7 +72,7 @@ class Week:
 
     def __init__(self, work: Path, rate: float, days: tuple[int, int, int], seed: int) -> None:
         self.work, self.days = work, days
-        self.plant = OwnControl(pilot_building(seed), START, sum(days), seed)
+        self.plant = OwnControl(pilot_building(seed), START, sum(days), seed, run_in=RUN_IN)
         file = self.plant.described("pilot", START)
         self.site = PlantSite(file, self.plant, work / "site", rate, CONTROL_STEP)
         self.uses: dict[int, tuple[str, float, float]] = {}

@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from _pilot_site import CONTROL_STEP, EFFECTS, OWN, OwnControl
+from _pilot_site import CONTROL_STEP, EFFECTS, OWN, RUN_IN, OwnControl
 from _plant_site import PlantSite
 from _seeds import seed_range
 from _table import markdown, write
@@ -36,9 +36,8 @@ from mpc.loop.make import save_pilot
 from thermal.case.building import Building
 from thermal.pilot.building import pilot_building
 
-#: Mondays of the weeks, one after the other by seed; days before them that the model is calibrated on, of a week, and
-#: under the building's own control before it: a plant of ours begins in a steady state.
-STARTS, BEFORE, DAYS, RUN_IN = ("2023-01-09", "2023-04-17", "2023-11-13"), 14, 7, 7
+#: Mondays of the weeks, one after the other by seed; days before them that the model is calibrated on, and of a week.
+STARTS, BEFORE, DAYS = ("2023-01-09", "2023-04-17", "2023-11-13"), 14, 7
 COLUMNS = ("office", "week of", "own control [USD]", "acting [USD]", "saved", "rehearsed", "promised by plans",
            "K h, own and acting")  # fmt: skip
 
@@ -57,8 +56,6 @@ def run_week(plant: OwnControl, site: Site, log: AuditLog | None, days: int) -> 
     """Run a week in shadow, with a log, or with the plans in force; give cost and discomfort by day."""
     planner, each = Planner(site), round(site.step / plant.control_step)
     seen = [plant.reset()]
-    for _ in range(round(RUN_IN * 86400.0 / plant.control_step)):
-        seen = [*seen, plant.step({})][-each:]
     for _ in range(round(days * 86400.0 / site.step)):
         means = np.mean([one.values_array for one in seen], axis=0)
         inputs = {"begin": float(seen[-1].seconds), "means": dict(zip(plant.columns, means.tolist(), strict=True)),
@@ -68,7 +65,7 @@ def run_week(plant: OwnControl, site: Site, log: AuditLog | None, days: int) -> 
             log.append("plan", {"inputs": inputs, "plan": plan})
         values = {} if log is not None else plan["values"]
         seen = [plant.step(values) for _ in range(each)]
-    return plant.bought().iloc[RUN_IN:]
+    return plant.bought()
 
 
 def compare(seed: int, days: int) -> dict[str, Any]:
@@ -79,8 +76,7 @@ def compare(seed: int, days: int) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         work = Path(folder)
         prepare(building, start, seed, work)
-        begin = f"{pd.Timestamp(start) - pd.Timedelta(days=RUN_IN):%Y-%m-%d}"
-        plant = OwnControl(building, begin, RUN_IN + days, seed)
+        plant = OwnControl(building, start, days, seed, run_in=RUN_IN)
         air, water = OWN.values()
         model = {"building": str(work / "case"), "parameters": str(work / "calibrated/calibration.json"),
                  "own_control": {"air": [air] * 2, "water": [water] * 2}}  # fmt: skip

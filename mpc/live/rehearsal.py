@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from calibration.progress import Progress
 from calibration.results import Axes, Result, plain
@@ -44,8 +46,8 @@ from thermal._types import FloatArray
 from thermal.case.building import Building
 from thermal.case.points import OUTDOOR_TEMPERATURE
 
-#: Days that the first one is run through beforehand, and then the first week, where there is one [d], under the
-#: building's own control: walls forget how they began, and have the weekend in them that a Monday has to make up for.
+#: Days that the first one is run through beforehand, and then those recorded before it, or of a week the week itself
+#: [d], all under the building's own control: walls forget how they began, and a Monday makes up for a weekend.
 _WARM_UP, _WEEK = 3, 7
 
 #: Seed of the sensors' noise.
@@ -157,16 +159,20 @@ def rehearse(
     if not isinstance(entry, BuildingModel):
         raise LiveError(where, expected, "none", "calibrate the building, and name it under `model`")
     recorded = _recorded(site.folder, begin, end)
-    times = sorted(recorded.now)
+    low = -math.inf if begin is None else begin.timestamp()
+    before, times = sorted(t for t in recorded.now if t < low), sorted(t for t in recorded.now if t >= low)
     steps = round((times[-1] - times[0]) / site.step) + 1 if times else 0
     expected, found = "a day of the controller's plans with their forecasts", f"{steps or 'no'} steps"
     LiveError.unless(steps * site.step >= DAY, f"{site.folder}", expected, found, "let it run in shadow")
-    first = times[0]
-    lead = round(_WEEK * DAY / site.step) if steps * site.step >= _WEEK * DAY else 0
+    first, week = times[0], round(_WEEK * DAY / site.step)
+    lead = round((first - before[0]) / site.step) if before else 0
+    taken = np.arange(-lead, steps)
+    if lead < week <= steps:
+        lead, taken = week, np.r_[0:week, 0:steps]
     building, system, parameters = believed(site, entry)
     step = MODEL_STEP if site.step % MODEL_STEP == 0.0 else site.step
     gains = "internal_gains" not in model_settings(parameters).effects  # which the model has itself otherwise
-    scenario = _scenario(site, building, recorded, first, (lead, steps), step, gains)
+    scenario = _scenario(site, building, recorded, first, taken, step, gains)
     plant = SimulatedPlant(
         scenario, system, ReducedBuilding(control_model(building, parameters), step_seconds=step),
         control_steps=round(site.step / step), noise=SensorNoise(), warm_up_days=_WARM_UP, seed=_SEED,
@@ -188,13 +194,14 @@ def rehearse(
             tell("rehearse", number * (lead + steps) + lead + k + 1, 2 * (lead + steps))
         runs.append(by_day(plant.record(), scenario, since=lead * round(site.step / step)))
     days = runs[1].join(runs[0].add_prefix("own_"))
-    days = days.assign(promised=_promised(recorded, site.plant.location.timezone))
-    return Rehearsal(site.file.name, days, _currency(site), steps, steps - len(recorded.forecasts))
+    rules = {time: rule for time, rule in recorded.rules.items() if time >= first}
+    days = days.assign(promised=_promised(rules, site.plant.location.timezone))
+    return Rehearsal(site.file.name, days, _currency(site), steps, steps - sum(t >= first for t in recorded.forecasts))
 
 
 def _recorded(folder: Path, begin: pd.Timestamp | None, end: pd.Timestamp | None) -> _Recorded:
-    """Read the controller's logs; a line that cannot be read is left out, as the log is not judged here."""
-    low = -math.inf if begin is None else begin.timestamp()
+    """Read the controller's logs, of a week before too; a line that cannot be read is left out, and not judged here."""
+    low = -math.inf if begin is None else begin.timestamp() - _WEEK * DAY
     high = math.inf if end is None else end.timestamp()
     past, found = dict[float, dict[str, Any]](), _Recorded([], {}, {}, {})
     for path in log_files(folder, "controller"):
@@ -223,19 +230,20 @@ def _recorded(folder: Path, begin: pd.Timestamp | None, end: pd.Timestamp | None
 
 
 def _scenario(
-    site: Site, building: Building, recorded: _Recorded, first: float, counts: tuple[int, int], step: float, gains: bool
-) -> Scenario:
+    site: Site, building: Building, recorded: _Recorded, first: float, taken: NDArray[np.int64], step: float,
+    gains: bool,
+) -> Scenario:  # fmt: skip
     """Lay out what drove the days, on the model's steps; what was not recorded stays as it was the step before.
 
-    Before them stand as many steps as the first of the counts says, which are the first ones once more.
+    `taken` are the control steps by their number after the first that counts, as they come one after the other.
     """
     zone, zones, each = site.plant.location.timezone, building.zone_names, round(site.step / step)
-    lead, steps = counts
-    begin = pd.Timestamp(first - lead * site.step, unit="s", tz="UTC").tz_convert(zone)
-    grid = StepGrid(begin, step, (lead + steps) * each)
-    taken = np.r_[0:lead, 0:steps]
-    times = first + site.step * np.arange(steps)
-    now = pd.DataFrame.from_dict(recorded.now, orient="index", dtype=float).reindex(times).ffill().bfill().take(taken)
+    steps, low = int(taken[-1]) + 1, int(taken.min())
+    begin = pd.Timestamp(first + (steps - taken.size) * site.step, unit="s", tz="UTC").tz_convert(zone)
+    grid = StepGrid(begin, step, taken.size * each)
+    times = first + site.step * np.arange(low, steps)
+    now = pd.DataFrame.from_dict(recorded.now, orient="index", dtype=float).reindex(times).ffill().bfill()
+    now = now.take(taken - low)
 
     def rows(*names: str) -> FloatArray:
         missing = [name for name in names if name not in now or now[name].isna().any()]
@@ -252,8 +260,9 @@ def _scenario(
     seen = past_table(recorded.past, first + (steps + 1) * site.step, site.step, zone, station)
     named = {f"{station}/{point}": point for point in WEATHER_POINTS if f"{station}/{point}" in seen}
     measured = seen[list(named)].rename(columns=named).interpolate(limit_direction="both")
-    stamps = begin + pd.to_timedelta(site.step * np.arange(1, lead + steps + 1), unit="s")
-    weather = Weather(measured.iloc[-steps:].take(taken).set_axis(stamps), building.location, step=site.step).on(grid)
+    measured = measured.iloc[low - steps:].take(taken - low)
+    measured.index = begin + pd.to_timedelta(site.step * np.arange(1, taken.size + 1), unit="s")
+    weather = Weather(measured, building.location, step=site.step).on(grid)
     nothing, carbon = np.zeros((grid.n_steps, len(zones))), np.zeros(grid.n_steps)
     given = gains and f"{zones[0]}/internal_gain" in now
     heat = SeriesGains(sensible=0.0, latent=0.0, others=of_zones("internal_gain") if given else nothing)
@@ -271,10 +280,10 @@ def _currency(site: Site) -> str:
     return "" if site.plant.prices is None else site.plant.prices.currency
 
 
-def _promised(recorded: _Recorded, timezone: str) -> pd.Series:
+def _promised(rules: Mapping[float, tuple[float, float]], timezone: str) -> pd.Series:
     """Share that the plans of a day expect to save, weighted by what the rule costs over their horizons [-]."""
-    index = pd.to_datetime(list(recorded.rules), unit="s", utc=True).tz_convert(timezone)
-    table = pd.DataFrame(list(recorded.rules.values()), index=index, columns=["rule", "saving"])
+    index = pd.to_datetime(list(rules), unit="s", utc=True).tz_convert(timezone)
+    table = pd.DataFrame(list(rules.values()), index=index, columns=["rule", "saving"])
     table["saved"] = table["rule"] * table["saving"]
     daily = table.resample("1D").sum()
     return daily["saved"] / daily["rule"].where(daily["rule"] > 0.0)

@@ -95,5 +95,8 @@ def test_a_monday_makes_up_for_the_weekend(office_site: Callable[[float], Any]) 
     assert told == [(k + 1, 4 * 7 * 96) for k in range(4 * 7 * 96)]
     alone = rehearse(site, end=monday + pd.Timedelta(days=1), controller=idle)
     assert len(alone.days) == 1
+    friday = rehearse(site, monday + pd.Timedelta(days=4), monday + pd.Timedelta(days=5), controller=idle)
+    assert (friday.steps, friday.lost) == (96, 0)  # four days, which were recorded before, are behind it
+    assert friday.days["own_energy"].iloc[0] == pytest.approx(week.days["own_energy"].iloc[4], rel=0.05)
     assert week.days["own_energy"].iloc[0] > 1.05 * alone.days["own_energy"].iloc[0]
     np.testing.assert_allclose(week.days["energy"], week.days["own_energy"], rtol=1e-9)
