@@ -28,13 +28,8 @@ from thermal.network.structure import Structure
 #: to 90.
 FAILS = 0.2
 
-
 #: Names of a gain that recurs, and of sun that nobody measures.
 GAINS, SUN = "internal_gains", "solar_gain"
-
-#: What moves the weather: that heat comes late is how floors and boilers are, and a heated floor that lacked nothing
-#: was taken for a clock by that.
-_WEATHER = ("weather_clock_shift",)
 
 #: Share of the lumped structure's error on left-out days below which a gain that recurs in each zone has a name [-]: on
 #: development seeds of houses and EnergyPlus' reference buildings 0.44, 0.54 and 0.84 where people's heat is missing,
@@ -186,7 +181,7 @@ def search_free(
     ahead = Forward(progress)
     said = {*known, *ruled_out}
     attempts: list[tuple[Structure, Effects, str | None]] = [(whole, chosen.effects, None)]
-    moved = beyond_a_step(found.problem, found.theta, np.sqrt(np.diag(found.covariance)), _WEATHER)
+    moved = beyond_a_step(found.problem, found.theta, np.sqrt(np.diag(found.covariance)), CATALOGUE[CLOCK].shifts)
     if CLOCK in chosen.effects and CLOCK not in said and moved:
         attempts.insert(0, (whole, {e: z for e, z in chosen.effects.items() if e != CLOCK}, CLOCK))
     if whole.recurring and GAINS not in said:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from calibration.diagnosis.baseline import fit_baseline
 from calibration.diagnosis.known import reasons_of
 from calibration.diagnosis.refit.comparison import ModelComparison
 from calibration.errors import CalibrationError, HorizonError, NotEnoughDataError
@@ -222,7 +223,8 @@ def monitor(
     given = ModelSettings(**read_settings(parameters)) if parameters is not None else ModelSettings()
     made = replace(given, effects={}, dx=chosen.dx if chosen.dx is not None else given.dx)
     models = ModelComparison(case, made, [reference], horizon=chosen.horizon)
-    models.drivers = _with_windows(case, fit_normalisation(case, [(reference.start, reference.end)]))
+    drivers = _with_windows(case, fit_normalisation(case, [(reference.start, reference.end)]))
+    models.drivers = drivers
     untestable = models.untestable()
     said = reasons_of(chosen.known or (), chosen.ruled_out, untestable)
     untestable |= {e: said[e] for e in chosen.ruled_out}
@@ -233,7 +235,8 @@ def monitor(
         effects = {name: tuple(zones) for name, zones in dict(given.effects).items()}
     else:
         known = chosen.known if chosen.known is not None else [e for e in USUAL if e not in untestable]
-        fit = models.fit({name: () for name in known}, [{}])
+        models, fit = fit_baseline(models, {name: () for name in known})
+        models.drivers = drivers
         values, effects = fit.values, dict(fit.effects)
     # what is in the model is watched like all else
     untestable = {e: why for e, why in untestable.items() if e not in effects or e in chosen.ruled_out}

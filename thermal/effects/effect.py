@@ -67,8 +67,8 @@ class Effect:
     applies : callable, optional
         Says why a building cannot have it, None when it can; every building can by default.
     shifts : tuple of str
-        Parameters that move telemetry in time [h]. Up to a step they say how a value is spread over its own step, which
-        telemetry cannot tell from the effect.
+        Parameters by which it moves telemetry in time [h]. Up to a step they say how a value is spread over its own
+        step, which telemetry cannot tell from the effect.
     roughly : bool
         Whether a rough estimate of what it needs is enough to tell that it is there.
     level : str
