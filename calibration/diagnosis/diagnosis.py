@@ -109,8 +109,8 @@ class Diagnosis(Result):
     band_factors : mapping of str to float
         What the filter's deviation is multiplied by for bands of its predictions, by zone [-].
     left_over : Regular or None
-        What comes back of the final model's errors, where the verdict hangs on it: where the drawing does not hold, or
-        an effect was accepted and much is left.
+        What comes back of the final model's errors, where the verdict hangs on it: where the drawing does not hold, an
+        effect was accepted and much is left, or errors are merely large.
     correction : Correction or None
         The baseline with heat of unknown cause, where no effect explains what is missing and such heat is certified.
     faults : tuple of Fault

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 from calibration.diagnosis.baseline import fit_baseline
-from calibration.diagnosis.decide.verdict import Verdict, doubted, gains_of, judge
+from calibration.diagnosis.decide.verdict import Verdict, doubted, gains_of, judge, summarised
 from calibration.diagnosis.faults import Fault, mend, with_faults
 from calibration.diagnosis.free import Free, drawing_fails, held_against, search_free, with_recurring
 from calibration.diagnosis.handed_on import other_structures
@@ -74,8 +74,8 @@ class Sought:
     free : Free or None
         What was sought about a free structure, where the drawing does not hold.
     left_over : Regular or None
-        What comes back of the errors of the last model, about a free structure, and where it decides whether an effect
-        that was accepted is named.
+        What comes back of the errors of the last model, about a free structure, and where it decides: whether an effect
+        that was accepted is named, or whether errors that are merely large say that something is missing.
     faults : tuple of Fault
         Of the telemetry, which were mended before anything else.
     last_third : float or None
@@ -229,7 +229,7 @@ class _About(NamedTuple):
 def _other_structures(about: _About, known: Sequence[str], ruled_out: Sequence[str], whole: Forward) -> _About:
     """Hold other structures against a drawing that lacks something, and seek effects about a free one."""
     models, rounds, case = about.models, about.rounds, about.models.case
-    unexplained = judge(rounds, about.untestable).name == "unexplained"
+    unexplained, alone = judge(rounds, about.untestable).name == "unexplained", summarised(rounds).by_size_alone()
     # a drawing that is known to lack what nothing explains has no advance
     advance = 0.0 if unexplained else ADVANCE
     for fit in held_against(rounds, case.building.geometry_quality):
@@ -239,6 +239,8 @@ def _other_structures(about: _About, known: Sequence[str], ruled_out: Sequence[s
             free = search_free(models, structures.kept, known, ruled_out, whole.part(0.6, "free structure"))
             structures = structures._replace(kept=free.kept)
             return _About(free.models, free.rounds, free.untestable, structures, free, free.left_over)
-    if unexplained and rounds[0].accepted and not is_large(case.building.zone_names):
-        return about._replace(left_over=regular(models, rounds[-1].after))
+    if unexplained and (rounds[0].accepted or alone) and not is_large(case.building.zone_names):
+        left_over = regular(models, rounds[-1].after)
+        if rounds[0].accepted or not left_over.matters:  # large errors of which nothing comes back are by chance
+            return about._replace(left_over=left_over)
     return about

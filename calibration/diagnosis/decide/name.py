@@ -57,9 +57,25 @@ class Summary(Plain):
         """
         if self.comes_back is not None:
             return self.comes_back
-        return self.left > max(levels.left_over, levels.left_of_change * self.change) or (
-            self.left > levels.left_in_a_zone and self.peak > levels.concentrated
-        )
+        return self.left > max(levels.left_over, levels.left_of_change * self.change) or self._in_a_zone(levels)
+
+    def _in_a_zone(self, levels: Levels) -> bool:
+        return self.left > levels.left_in_a_zone and self.peak > levels.concentrated
+
+    def _shows(self, levels: Levels) -> bool:
+        return self.generic > max(levels.generic, self.generic_level)
+
+    def by_size_alone(self, levels: Levels = LEVELS) -> bool:
+        """Whether nothing says that something is missing but errors that are large all over the building.
+
+        So are those of people who come and go, and of heaters that cycle between rough sensors.
+
+        Parameters
+        ----------
+        levels : Levels
+            Those to judge by.
+        """
+        return not (self.accepted or self._shows(levels) or self._in_a_zone(levels))
 
     def explained(self, levels: Levels = LEVELS) -> float:
         """Share of the squared error that is explained [-]: where it was fitted, or held out unless much is left over.
@@ -88,5 +104,5 @@ class Summary(Plain):
             if self.group > LARGEST_GROUP:
                 return "unexplained"
             return "named" if self.group == 1 else "group"
-        shows = self.comes_back is None and self.generic > max(levels.generic, self.generic_level)
+        shows = self.comes_back is None and self._shows(levels)
         return "unexplained" if self.accepted or shows or much else "no_gap"

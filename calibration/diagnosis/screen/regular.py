@@ -57,7 +57,12 @@ class Regular(Plain):
     @property
     def counts(self) -> bool:
         """Whether it is beyond chance, as the best of several, and large enough to matter to a prediction."""
-        return self.fall > MATTERS and self.sure > _SURE
+        return self.matters and self.sure > _SURE
+
+    @property
+    def matters(self) -> bool:
+        """Whether it is large enough to matter to a prediction, by chance or not."""
+        return self.fall > MATTERS
 
 
 def regular(models: ModelComparison, fit: Fit) -> Regular:

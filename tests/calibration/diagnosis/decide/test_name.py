@@ -36,3 +36,10 @@ FOUND = replace(QUIET, accepted=True, group=1, tuning=0.5, held_out=0.3)
 )
 def test_verdicts(told: Summary, name: str) -> None:
     assert told.name(LEVELS) == name
+
+
+@pytest.mark.parametrize(
+    ("more", "alone"), [({}, True), ({"left": 0.3, "peak": 4.0}, False), ({"generic": 9.0}, False), ({"accepted": True}, False)]
+)
+def test_errors_all_over_the_building_say_little_by_themselves(more: dict[str, float], alone: bool) -> None:
+    assert replace(QUIET, **{"left": 0.5, **more}).by_size_alone(LEVELS) == alone
