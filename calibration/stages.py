@@ -7,11 +7,15 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from threading import Lock
 from typing import Protocol, TypeVar, cast
 
 import casadi as ca
 
 T = TypeVar("T")
+
+#: CasADi's context of pickling is one for the process, whose threads may do a case each.
+_PICKLING = Lock()
 
 
 class Keeper(Protocol):
@@ -87,10 +91,10 @@ def stage(name: str, work: Callable[[], T]) -> T:
 
 
 def _dumped(found: object) -> bytes:
-    with ca.global_pickle_context():
+    with _PICKLING, ca.global_pickle_context():
         return pickle.dumps(found, pickle.HIGHEST_PROTOCOL)
 
 
 def _loaded(content: bytes) -> object:
-    with ca.global_unpickle_context():
+    with _PICKLING, ca.global_unpickle_context():
         return pickle.loads(content)
