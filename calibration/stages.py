@@ -5,17 +5,13 @@ from __future__ import annotations
 import pickle
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
-from threading import Lock
 from typing import Protocol, TypeVar, cast
 
 import casadi as ca
 
 T = TypeVar("T")
-
-#: CasADi's context of pickling is one for the process, whose threads may do a case each.
-_PICKLING = Lock()
 
 
 class Keeper(Protocol):
@@ -38,16 +34,18 @@ class _Stages:
     def do(self, name: str, work: Callable[[], T]) -> T:
         self.begun[-1] += 1
         path = f"{'.'.join(str(n) for n in self.begun)} {name}"
-        kept = self.keeper.read(path)
-        if kept is not None:
-            return cast("T", _loaded(kept))
+        with suppress(Exception):  # what was cut off, or is of another time, is done again
+            kept = self.keeper.read(path)
+            if kept is not None:
+                return cast("T", _loaded(kept))
         self.begun.append(0)
         try:
             found = work()
         finally:
             self.begun.pop()
         if time.monotonic() - self.last >= self.every:
-            self.keeper.write(path, _dumped(found))
+            with suppress(Exception):  # a full disk costs another attempt time, and this one nothing
+                self.keeper.write(path, _dumped(found))
             self.last = time.monotonic()
         return found
 
@@ -91,10 +89,10 @@ def stage(name: str, work: Callable[[], T]) -> T:
 
 
 def _dumped(found: object) -> bytes:
-    with _PICKLING, ca.global_pickle_context():
+    with ca.global_pickle_context():
         return pickle.dumps(found, pickle.HIGHEST_PROTOCOL)
 
 
 def _loaded(content: bytes) -> object:
-    with _PICKLING, ca.global_unpickle_context():
+    with ca.global_unpickle_context():
         return pickle.loads(content)

@@ -6,6 +6,7 @@ import time
 from collections import deque
 from collections.abc import Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
+from contextlib import suppress
 
 from calibration.errors import WorkerLostError
 from calibration.fleet.cluster import ClusterExecutor, killed_worker
@@ -55,10 +56,12 @@ def outcomes_of(
             error = WorkerLostError(f"{handed.trouble}; the same command goes on from here")
             yield task.finished() or task.unfinished("lost", error)
     finally:
-        for future in handed.pending:
-            future.cancel()
+        begun = [task for future, task in handed.pending.items() if not future.cancel()]
         if own:
             pool.shutdown(wait=False, cancel_futures=True)
+            for task in begun:  # it is this run that ends their workers, not they
+                with suppress(OSError):
+                    task.survived()
 
 
 class _Handed:

@@ -10,7 +10,7 @@ import socket
 import sys
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -204,12 +204,11 @@ class _Kept:
         return self.task.read_stage(self._file(name))
 
     def write(self, name: str, content: bytes) -> None:
-        with suppress(OSError):  # a full disk costs another attempt time, and this one nothing
-            self.task.keep_stage(self._file(name), content)
+        self.task.keep_stage(self._file(name), content)
 
     def _file(self, name: str) -> str:
         task = self.task
-        program = (platform.python_version(), version("numpy"), version("casadi"))
+        program = (platform.python_version(), *(version(name) for name in ("numpy", "scipy", "pandas", "casadi")))
         made = f"{name} {self.key} {program} {task.run if task.force else ''}"
         return f"{name.partition(' ')[0]}-{hashlib.sha256(made.encode()).hexdigest()[:24]}.pickle"
 

@@ -140,6 +140,14 @@ def test_a_case_of_many_goes_on_with_another_worker(task: Task, tmp_path: Path) 
     assert not (tmp_path / "out" / STAGES / "one").exists()
 
 
+def test_what_was_cut_off_is_done_again(task: Task, tmp_path: Path) -> None:
+    ended(task, "d")
+    for file in (tmp_path / "out" / STAGES / "one").iterdir():
+        file.write_bytes(b"")
+    assert do_one(task).status == "calibrated"
+    assert DONE == [*"abc", *"abcd"]
+
+
 @pytest.mark.parametrize("other", [{"settings": {"dx": 1.0}}, {"force": True, "run": "next"}, "contents"])
 def test_stages_of_something_else_are_not_taken_over(task: Task, tmp_path: Path, other: Any) -> None:
     ended(task, "d")
