@@ -213,12 +213,14 @@ def rehearse(
 
 def _local(text: str, where: str, timezone: str) -> Timestamp | None:
     """Read a local time; None for none."""
-    from pandas import Timestamp
+    from pandas import Timestamp, isna
 
     if not text:
         return None
     try:
         read = Timestamp(text)
+        if isna(read):
+            raise ValueError(text)
         return read.tz_localize(timezone) if read.tzinfo is None else read
     except ValueError as error:
         raise LiveError(where, "a time in ISO 8601", repr(text), "for example 2026-01-05") from error

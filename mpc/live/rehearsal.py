@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -50,6 +50,9 @@ from thermal.case.points import OUTDOOR_TEMPERATURE
 #: [d], all under the building's own control: walls forget how they began, and a Monday makes up for a weekend.
 _WARM_UP, _WEEK = 3, 7
 
+#: Least share of a day's steps that must be on record for it to count [-]; what is missing stays as it was before.
+_ON_RECORD = 0.9
+
 #: Seed of the sensors' noise.
 _SEED = 0
 
@@ -69,7 +72,7 @@ class Rehearsal(Result):
     currency : str
         Of the costs.
     steps, lost : int
-        Control steps, and those of them without a forecast.
+        Control steps of these days, and those of them without a forecast.
     """
 
     site: str
@@ -107,7 +110,7 @@ class Rehearsal(Result):
         return content
 
     def _summary(self) -> str:
-        return f"{self.site}, {len(self.days)} days: {self.saving:.1%} saved; plans promised {self.promised:.1%}"
+        return f"{self.site}, {len(self.days)} days: {self.saving:.1%} saved"
 
     def _draw(self, axes: Axes) -> None:
         shown = self.days[["own_cost", "cost"]].rename(columns={"own_cost": "own control", "cost": "optimal control"})
@@ -117,12 +120,20 @@ class Rehearsal(Result):
 
 @dataclass(frozen=True)
 class _Recorded:
-    """What the controller was asked with, by the begin of the step: means before it, what was forecast, and savings."""
+    """What the controller was asked with, by the begin of the step: means before it, what was forecast, and savings.
+
+    Beside that the first and last begin of all that is logged.
+    """
 
     past: list[dict[str, Any]]
     now: dict[float, dict[str, float | None]]
     forecasts: dict[float, Forecast]
     rules: dict[float, tuple[float, float]]
+    ends: list[float]
+
+    def reach(self, site: Site) -> str:
+        """Say what is logged."""
+        return f" of what is logged, {' to '.join(map(str, _local(self.ends, site)))}" if self.ends else ""
 
 
 def rehearse(
@@ -152,19 +163,23 @@ def rehearse(
     Raises
     ------
     LiveError
-        When the site has no building, or less than a day was recorded then.
+        When the site has no building, or no local day was recorded then as a whole; days in part are not counted.
     """
     entry, where = site.file.model, f"{site.path.name}: model"
     expected = "a building, whose control and own control can be run"
     if not isinstance(entry, BuildingModel):
         raise LiveError(where, expected, "none", "calibrate the building, and name it under `model`")
+    if begin is not None and end is not None:
+        LiveError.unless(end > begin, "end", f"a time after {begin}", end)
     recorded = _recorded(site.folder, begin, end)
     low = -math.inf if begin is None else begin.timestamp()
     before, times = sorted(t for t in recorded.now if t < low), sorted(t for t in recorded.now if t >= low)
-    steps = round((times[-1] - times[0]) / site.step) + 1 if times else 0
-    expected, found = "a day of the controller's plans with their forecasts", f"{steps or 'no'} steps"
-    LiveError.unless(steps * site.step >= DAY, f"{site.folder}", expected, found, "let it run in shadow")
+    times = [t for t in times if (t - times[0]) % site.step == 0.0]  # the control step may have been another one
+    whole = _whole_days(times, site)
+    expected, found = "a day of the controller's plans with their forecasts", f"{len(times) or 'no'} steps"
+    LiveError.unless(whole.size, f"{site.folder}", expected, f"{found}{recorded.reach(site)}", "let it run in shadow")
     first, week = times[0], round(_WEEK * DAY / site.step)
+    steps = round((times[-1] - first) / site.step) + 1
     lead = round((first - before[0]) / site.step) if before else 0
     taken = np.arange(-lead, steps)
     if lead < week <= steps:
@@ -195,15 +210,27 @@ def rehearse(
         runs.append(by_day(plant.record(), scenario, since=lead * round(site.step / step)))
     days = runs[1].join(runs[0].add_prefix("own_"))
     rules = {time: rule for time, rule in recorded.rules.items() if time >= first}
-    days = days.assign(promised=_promised(rules, site.plant.location.timezone))
-    return Rehearsal(site.file.name, days, _currency(site), steps, steps - sum(t >= first for t in recorded.forecasts))
+    days = days.assign(promised=_promised(rules, site.plant.location.timezone)).loc[whole]
+    counted = round(len(whole) * DAY / site.step)
+    lost = max(counted - sum(t.normalize() in whole for t in _local(times, site)), 0)
+    return Rehearsal(site.file.name, days, _currency(site), counted, lost)
+
+
+def _local(times: Sequence[float], site: Site) -> pd.DatetimeIndex:
+    return pd.to_datetime(list(times), unit="s", utc=True).tz_convert(site.plant.location.timezone)
+
+
+def _whole_days(times: Sequence[float], site: Site) -> pd.DatetimeIndex:
+    """Local midnights of the days of which next to all steps are on record; of others too much would be invented."""
+    each = pd.Series(1.0, index=_local(times, site)).resample("1D").sum()
+    return pd.DatetimeIndex(each.index[each.to_numpy() * site.step >= _ON_RECORD * DAY])
 
 
 def _recorded(folder: Path, begin: pd.Timestamp | None, end: pd.Timestamp | None) -> _Recorded:
     """Read the controller's logs, of a week before too; a line that cannot be read is left out, and not judged here."""
     low = -math.inf if begin is None else begin.timestamp() - _WEEK * DAY
     high = math.inf if end is None else end.timestamp()
-    past, found = dict[float, dict[str, Any]](), _Recorded([], {}, {}, {})
+    past, found = dict[float, dict[str, Any]](), _Recorded([], {}, {}, {}, [])
     for path in log_files(folder, "controller"):
         with path.open("rb") as lines:
             for line in lines:
@@ -213,6 +240,7 @@ def _recorded(folder: Path, begin: pd.Timestamp | None, end: pd.Timestamp | None
                     content = json.loads(line)["content"]
                     inputs, plan = content["inputs"], content["plan"]
                     at, forecast = float(inputs["begin"]), inputs["forecast"]
+                    found.ends[:] = [min([at, *found.ends]), max([at, *found.ends])]
                     if not low <= at < high or forecast is None:
                         continue
                     row = dict(zip(forecast["columns"], (values[0] for values in forecast["values"]), strict=True))

@@ -55,8 +55,10 @@ def test_a_recorded_day_is_run_through_anew(office_site: Callable[[float], Any],
     begin = pd.Timestamp("2023-01-09T12:00", tz="Etc/GMT+8")
     with pytest.raises(LiveError, match="a day of the controller's plans with their forecasts, found 48 steps"):
         rehearse(site, begin)
-    with pytest.raises(LiveError, match="found no steps"):
+    with pytest.raises(LiveError, match="found no steps of what is logged, 2023-01-09 00:00:00-08:00 to 2023-01-09 23:45"):
         rehearse(site, begin + pd.DateOffset(years=1))
+    with pytest.raises(LiveError, match="end: expected a time after 2023-01-09 12:00"):
+        rehearse(site, begin, begin)
 
 
 def own_cost(site: Site, gain: float) -> float:
@@ -93,6 +95,8 @@ def test_a_monday_makes_up_for_the_weekend(office_site: Callable[[float], Any]) 
     week = rehearse(site, controller=idle, progress=lambda _, done, total: told.append((done, total)))
     assert (len(week.days), week.steps, week.days.index[0]) == (7, 7 * 96, monday)
     assert told == [(k + 1, 4 * 7 * 96) for k in range(4 * 7 * 96)]
+    days = rehearse(site, monday + pd.Timedelta(hours=14), monday + pd.Timedelta(days=2.5), controller=idle)
+    assert (list(days.days.index), days.steps, days.lost) == ([monday + pd.Timedelta(days=1)], 96, 0)  # the whole one
     alone = rehearse(site, end=monday + pd.Timedelta(days=1), controller=idle)
     assert len(alone.days) == 1
     friday = rehearse(site, monday + pd.Timedelta(days=4), monday + pd.Timedelta(days=5), controller=idle)
