@@ -6,7 +6,7 @@ What a controller or a policy is to stand that must not trust one model: it is t
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,9 @@ from thermal.case.building import Building
 
 #: Probability below which a set of effects is left out [-].
 _LEAST = 0.01
+
+#: Eigenvalue of a covariance, on the estimation scale, that rounding may take below zero [-].
+_SMALL = 1e-9
 
 
 @dataclass(frozen=True)
@@ -71,8 +74,9 @@ class Possible:
             When the building has no such parameters.
         """
         parameters = {p.name: p for p in self.settings.network(building).parameters}
-        if set(self.values) != set(parameters):
-            raise CalibrationError("posterior", f"parameters of {building.name}", "those of another building")
+        other = sorted(set(self.values) ^ set(parameters))
+        found = f"those of another: {_shown(other)}"
+        CalibrationError.unless(not other, "posterior", f"parameters of {building.name}", found)
         estimated = [parameters[name] for name in self.estimated]
         likely = np.array([p.transform(self.values[p.name]) for p in estimated])
         points = rng.multivariate_normal(likely, self.covariance, size=count, method="eigh")
@@ -93,6 +97,8 @@ class Posterior:
         By sets of effects; their probabilities sum to 1.
     disturbance : DisturbanceModel or None
         Heat that the likeliest of them leaves unexplained, where it is known.
+    zones : tuple of str
+        Of the building, by which it is known again.
 
     Examples
     --------
@@ -105,6 +111,7 @@ class Posterior:
 
     models: tuple[Possible, ...]
     disturbance: DisturbanceModel | None
+    zones: tuple[str, ...]
 
     def draw(self, building: Building, count: int, seed: int = 0) -> tuple[DrawnModel, ...]:
         """Draw models, those with the same effects side by side.
@@ -123,6 +130,10 @@ class Posterior:
         CalibrationError
             When the building is another one.
         """
+        same = tuple(building.zone_names) == self.zones
+        advice = "give the building that the diagnosis was made of"
+        CalibrationError.unless(same, "posterior", f"a building with the zones {_shown(self.zones)}",
+                                f"{building.name} with {_shown(building.zone_names)}", advice)  # fmt: skip
         rng, drawn = np.random.default_rng(seed), list[DrawnModel]()
         counts = rng.multinomial(count, [one.probability for one in self.models])
         for one, times in zip(self.models, counts.tolist(), strict=True):
@@ -134,7 +145,7 @@ class Posterior:
     def to_dict(self) -> dict[str, Any]:
         """Contents of ``posterior.json``."""
         models = [vars(one) | {"settings": one.settings.to_dict()} for one in self.models]
-        content: dict[str, Any] = plain({"models": models, "disturbance": self.disturbance})
+        content: dict[str, Any] = plain({"models": models, "disturbance": self.disturbance, "zones": self.zones})
         return content
 
 
@@ -153,6 +164,7 @@ def posterior_of(diagnosis: Diagnosis, building: Building) -> Posterior:
         That it was made of.
     """
     better = diagnosis.better
+    zones = building.zone_names
     if better is not None:
         parameters = {p.name: p for p in better.settings.network(building).parameters}
         known = {p.name: p.standard_error / parameters[p.name].slope(p.value) for p in better.parameters
@@ -160,10 +172,14 @@ def posterior_of(diagnosis: Diagnosis, building: Building) -> Posterior:
         spread = np.array([min(error, parameters[name].prior_deviation) for name, error in known.items()])
         values = {p.name: p.value for p in better.parameters if p.name in parameters}
         only = Possible(1.0, better.settings, values, tuple(known), np.diag(spread**2))
-        return Posterior((only,), better.disturbance)
-    kept = [(share, fit) for share, fit in _chances(diagnosis) if share >= _LEAST]
+        return Posterior((only,), better.disturbance, zones)
+    # heat of unknown cause is handed on where no effect explains what is missing
+    corrected = diagnosis.taken is not diagnosis.final
+    chances = [(1.0, diagnosis.taken)] if corrected else _chances(diagnosis)
+    kept = [(share, fit) for share, fit in chances if share >= _LEAST]
     whole = sum(share for share, _ in kept)
-    return Posterior(tuple(_possible(share / whole, fit, diagnosis) for share, fit in kept), diagnosis.disturbance)
+    models = tuple(_possible(share / whole, fit, diagnosis) for share, fit in kept)
+    return Posterior(models, diagnosis.disturbance, zones)
 
 
 def _chances(diagnosis: Diagnosis) -> list[tuple[float, Fit]]:
@@ -177,7 +193,8 @@ def _chances(diagnosis: Diagnosis) -> list[tuple[float, Fit]]:
         own = r.accepted.screened.effect
         others = {x.screened.effect: x.fit for x in r.refits if x.screened.effect != own}
         fitted = share[own] + sum(share[e] for e in others)
-        there = min(1.0 - none, (judged[own] + sum(judged[e] for e in others)) / real)
+        # one that a later round accepted is judged by that round too, which says nothing of this one
+        there = min(1.0 - none, judged[own] / real + sum(min(judged[e] / real, share[e]) for e in others))
         found.append((real * (1.0 - there), r.before))
         found += [(real * there * share[e] / fitted, fit) for e, fit in others.items()]
         real *= there * share[own] / fitted
@@ -211,9 +228,9 @@ def read_posterior(path: str | Path) -> Posterior:
         raise CalibrationError(f"{path}: expected a posterior as `diagnose` writes it, found {error}") from error
     try:
         models, heat = tuple(_read(one, path) for one in content["models"]), content["disturbance"]
-        if not models:
-            raise ValueError("no models")
-        return Posterior(models, None if heat is None else DisturbanceModel(**heat))
+        if not np.isclose(sum(one.probability for one in models), 1.0) or min(one.probability for one in models) < 0.0:
+            raise ValueError("probabilities that are not 0 or more and 1 together")
+        return Posterior(models, None if heat is None else DisturbanceModel(**heat), tuple(content["zones"]))
     except (KeyError, TypeError, ValueError, FilterError) as error:
         raise CalibrationError(f"{path}: expected a posterior as `diagnose` writes it, found {error!r}") from error
 
@@ -222,4 +239,15 @@ def _read(entry: Mapping[str, Any], path: Path) -> Possible:
     estimated = tuple(entry["estimated"])
     covariance = np.array(entry["covariance"], dtype=float).reshape(len(estimated), len(estimated))
     settings = ModelSettings(**told_settings(entry["settings"], path))
-    return Possible(float(entry["probability"]), settings, entry["values"], estimated, covariance)
+    values = {name: float(value) for name, value in entry["values"].items()}
+    if not (np.isfinite(covariance).all() and np.isfinite(list(values.values())).all()):
+        raise ValueError("numbers that are not finite")
+    if not (np.allclose(covariance, covariance.T) and np.linalg.eigvalsh(covariance).min(initial=0.0) >= -_SMALL):
+        raise ValueError("a covariance that is none")
+    if not set(estimated) <= set(values):
+        raise ValueError("estimated parameters without values")
+    return Possible(float(entry["probability"]), settings, values, estimated, covariance)
+
+
+def _shown(names: Sequence[str]) -> str:
+    return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")

@@ -9,6 +9,7 @@ import pytest
 
 from calibration.diagnosis.correction import Correction, correct
 from calibration.diagnosis.diagnosis import Diagnosis, diagnose
+from calibration.diagnosis.posterior import read_posterior
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.diagnosis.refit.refit import HeldOut, held_out
 from calibration.evaluation.case_model import case_model
@@ -119,6 +120,8 @@ def _whole(found: Diagnosis, out: Path) -> None:
     content = json.loads((out / "d" / "calibration.json").read_text(encoding="utf-8"))
     assert {e["effect"] for e in content["effects"]} == {d.effect for d in found.correction.drivers}
     assert set(content["settings"]["effects"]) <= set(UNKNOWN)
+    (only,) = read_posterior(out / "d" / "posterior.json").draw(draughty().building, 1)
+    assert set(only.settings.effects) == {d.effect for d in found.correction.drivers}
     model = case_model(draughty(), out / "d" / "calibration.json")
     assert dict(zip([p.name for p in model.grid.network.parameters], model.theta, strict=True)) == pytest.approx(
         found.taken.values

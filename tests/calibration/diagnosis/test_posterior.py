@@ -61,7 +61,7 @@ def left_possible(refits: tuple[Refit, ...], judged: Mapping[str, float]) -> Pos
     told = tuple(replace(c, probability=judged.get(c.effect, 0.0)) for c in verdict.candidates)
     found = SimpleNamespace(
         better=None, rounds=rounds, verdict=replace(verdict, candidates=told), settings=first.before.settings,
-        disturbance=None,
+        disturbance=None, final=refits[0].fit, taken=refits[0].fit,
     )  # fmt: skip
     return posterior_of(cast(Diagnosis, found), office().building)
 
@@ -93,11 +93,14 @@ def test_sets_of_effects_have_the_probability_of_the_search() -> None:
 def test_what_other_days_doubt_may_not_be_there() -> None:
     doubted = left_possible((refit(SUN, 60.0),), {SUN: 0.3})
     assert chances(doubted) == {(): pytest.approx(0.7), (SUN,): pytest.approx(0.3)}
+    # what another round is sure of, and this one hardly gains by, does not make up for that
+    beside = left_possible((refit(SUN, 60.0), refit(AIR, 10.0)), {SUN: 0.3, AIR: 1.0})
+    assert chances(beside) == {(): pytest.approx(0.7), (SUN,): pytest.approx(0.3)}
 
 
 def test_draws_are_as_wide_as_the_data_leave_them_and_within_their_ranges() -> None:
     one = torn(60.0, 10.0).models[0]
-    only = Posterior((one,), None)
+    only = Posterior((one,), None, office().building.zone_names)
     values = [m.values for m in only.draw(office().building, 400, seed=2)]
     parameters = {p.name: p for p in one.settings.network(office().building).parameters}
     for k, name in enumerate(one.estimated):
@@ -127,9 +130,15 @@ def test_a_file_holds_all_of_it(tmp_path: Path) -> None:
     mine, theirs = (p.draw(office().building, 3, seed=5) for p in (made, read))
     assert [m.values for m in mine] == [t.values for t in theirs] and theirs[0].disturbance is not None
     other = pilot_building(1, floor_area=200.0, zones=4, name="other")
-    with pytest.raises(CalibrationError, match="posterior: expected parameters of other"):
-        replace(read, models=tuple(replace(m, values={"nothing": 1.0}) for m in read.models)).draw(other, 1)
-    for text in ("{", "[]", '{"models": [{}], "disturbance": null}', '{"models": []}'):
+    with pytest.raises(CalibrationError, match="posterior: expected a building with the zones .*, found other with"):
+        read.draw(other, 1)
+    with pytest.raises(CalibrationError, match="those of another: .* more"):
+        replace(read, models=tuple(replace(m, values={"nothing": 1.0}) for m in read.models)).draw(office().building, 1)
+    spoilt = ({"probability": 0.9}, {"probability": -1.0}, {"covariance": None}, {"estimated": ["nothing"]},
+              {"values": {name: None for name in read.models[0].values}})  # fmt: skip
+    told = made.to_dict()
+    texts = [json.dumps(told | {"models": [told["models"][0] | one, told["models"][1]]}) for one in spoilt]
+    for text in (*texts, "{", "[]", '{"models": [{}], "disturbance": null}', '{"models": []}'):
         path.write_text(text, encoding="utf-8")
         with pytest.raises(CalibrationError, match="expected a posterior"):
             read_posterior(path)
