@@ -71,7 +71,8 @@ class OwnControl:
     def __init__(
         self, building: Building, start: str, days: float, seed: int, step: float = STEP, run_in: int = 0
     ) -> None:
-        self.building, self.control_step, self.run_in = building, step, run_in
+        self.building, self.control_step, self._lead = building, step, round(run_in * 86400.0 / step)
+        self.steps, self._done = round(days * 86400.0 / step), 0
         start, days = f"{pd.Timestamp(start) - pd.Timedelta(days=run_in):%Y-%m-%d}", days + run_in
         reach = round((HORIZON + (AHEAD + 1) * CONTROL_STEP) / step)
         end = (pd.Timestamp(start) + pd.Timedelta(days=days, seconds=reach * step)).isoformat()
@@ -81,7 +82,6 @@ class OwnControl:
         )  # fmt: skip
         weather = pilot_weather(seed, start, np.ceil(days + 1.0), step_seconds=step)
         self.plant: SimulatedPlant = simulated_plant(building, weather, start, end, self.settings)
-        self.steps, self._done = round((days - run_in) * 86400.0 / step), 0
         kinds = {a.name: a.name.rpartition("/")[2] for a in self.plant.actuators}
         self.own = {name: OWN[kind] for name, kind in kinds.items() if kind in OWN}
         self.actuators: tuple[Actuator, ...] = tuple(a for a in self.plant.actuators if a.name in self.own)
@@ -103,7 +103,7 @@ class OwnControl:
     def reset(self, seed: int | None = None) -> Measurements:
         """Start anew, as `Plant.reset`."""
         self._done, seen = 0, self.plant.reset(seed)
-        for _ in range(round(self.run_in * 86400.0 / self.control_step)):
+        for _ in range(self._lead):
             seen = self.plant.step(self.own)
         return self._named(seen)
 
@@ -150,4 +150,4 @@ class OwnControl:
 
     def bought(self) -> pd.DataFrame:
         """Cost of energy [currency], energy [kWh] and discomfort of all zones [K h] by local day."""
-        return by_day(self.record(), self.plant.scenario, since=round(self.run_in * 86400.0 / self.control_step))
+        return by_day(self.record(), self.plant.scenario, since=self._lead)

@@ -17,8 +17,8 @@ T = TypeVar("T")
 class Keeper(Protocol):
     """Where the ends of stages are kept."""
 
-    def read(self, name: str) -> bytes | None:
-        """Read what was kept under a name; None where nothing was."""
+    def read(self, name: str) -> bytes:
+        """Read what was kept under a name; any exception says that nothing was."""
 
     def write(self, name: str, content: bytes) -> None:
         """Keep contents under a name."""
@@ -34,10 +34,8 @@ class _Stages:
     def do(self, name: str, work: Callable[[], T]) -> T:
         self.begun[-1] += 1
         path = f"{'.'.join(str(n) for n in self.begun)} {name}"
-        with suppress(Exception):  # what was cut off, or is of another time, is done again
-            kept = self.keeper.read(path)
-            if kept is not None:
-                return cast("T", _loaded(kept))
+        with suppress(Exception):  # what is not there, was cut off, or is of another time, is done
+            return cast("T", _loaded(self.keeper.read(path)))
         self.begun.append(0)
         try:
             found = work()

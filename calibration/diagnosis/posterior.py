@@ -6,7 +6,7 @@ What a controller or a policy is to stand that must not trust one model: it is t
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,7 @@ from calibration.evaluation.settings import ModelSettings, told_settings
 from calibration.results import plain
 from thermal._types import FloatArray
 from thermal.case.building import Building
+from thermal.case.plausibility.anomaly import listed
 
 #: Probability below which a set of effects is left out [-].
 _LEAST = 0.01
@@ -75,7 +76,7 @@ class Possible:
         """
         parameters = {p.name: p for p in self.settings.network(building).parameters}
         other = sorted(set(self.values) ^ set(parameters))
-        found = f"those of another: {_shown(other)}"
+        found = f"those of another: {listed(other, most=3)}"
         CalibrationError.unless(not other, "posterior", f"parameters of {building.name}", found)
         estimated = [parameters[name] for name in self.estimated]
         likely = np.array([p.transform(self.values[p.name]) for p in estimated])
@@ -132,8 +133,8 @@ class Posterior:
         """
         same = tuple(building.zone_names) == self.zones
         advice = "give the building that the diagnosis was made of"
-        CalibrationError.unless(same, "posterior", f"a building with the zones {_shown(self.zones)}",
-                                f"{building.name} with {_shown(building.zone_names)}", advice)  # fmt: skip
+        CalibrationError.unless(same, "posterior", f"a building with the zones {listed(self.zones, most=3)}",
+                                f"{building.name} with {listed(building.zone_names, most=3)}", advice)  # fmt: skip
         rng, drawn = np.random.default_rng(seed), list[DrawnModel]()
         counts = rng.multinomial(count, [one.probability for one in self.models])
         for one, times in zip(self.models, counts.tolist(), strict=True):
@@ -247,7 +248,3 @@ def _read(entry: Mapping[str, Any], path: Path) -> Possible:
     if not set(estimated) <= set(values):
         raise ValueError("estimated parameters without values")
     return Possible(float(entry["probability"]), settings, values, estimated, covariance)
-
-
-def _shown(names: Sequence[str]) -> str:
-    return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")

@@ -70,21 +70,18 @@ class CaseTask(Task):
     def survived(self) -> None:
         """Keep the marks: they go with the run."""
 
-    def read_stage(self, name: str) -> bytes | None:
-        """Read what a stage of the case ended with; None where no attempt came so far.
+    def read_stage(self, name: str) -> bytes:
+        """As `Task.read_stage`.
 
         Parameters
         ----------
         name : str
             Of a file.
         """
-        try:
-            return (self._stages / name).read_bytes()
-        except OSError:
-            return None
+        return (self._stages / name).read_bytes()
 
     def keep_stage(self, name: str, content: bytes) -> None:
-        """Keep what a stage of the case ended with, whole or not at all, until it has results.
+        """As `Task.keep_stage`.
 
         Parameters
         ----------

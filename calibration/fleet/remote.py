@@ -84,21 +84,18 @@ class RemoteTask(Task):
         """Write down that the case ended without results and without ending its worker."""
         Store(self.out).remove(f"{_BEGUN}/{self.case}")
 
-    def read_stage(self, name: str) -> bytes | None:
-        """Read what a stage of the case ended with; None where no attempt came so far.
+    def read_stage(self, name: str) -> bytes:
+        """As `Task.read_stage`.
 
         Parameters
         ----------
         name : str
             Of a file.
         """
-        try:
-            return Store(self.out).read(f"{STAGES}/{self.case}/{name}")
-        except OSError:
-            return None
+        return Store(self.out).read(f"{STAGES}/{self.case}/{name}")
 
     def keep_stage(self, name: str, content: bytes) -> None:
-        """Keep what a stage of the case ended with, whole or not at all, until it has results.
+        """As `Task.keep_stage`.
 
         Parameters
         ----------

@@ -98,13 +98,18 @@ class Task:
         """Write down that the case ended without results and without ending its worker."""
         raise NotImplementedError
 
-    def read_stage(self, name: str) -> bytes | None:
-        """Read what a stage of the case ended with; None where no attempt came so far.
+    def read_stage(self, name: str) -> bytes:
+        """Read what a stage of the case ended with.
 
         Parameters
         ----------
         name : str
             Of a file.
+
+        Raises
+        ------
+        FileNotFoundError
+            When no attempt came so far.
         """
         raise NotImplementedError
 
@@ -200,7 +205,7 @@ class _Kept:
     task: Task
     key: str
 
-    def read(self, name: str) -> bytes | None:
+    def read(self, name: str) -> bytes:
         return self.task.read_stage(self._file(name))
 
     def write(self, name: str, content: bytes) -> None:

@@ -210,14 +210,14 @@ def rehearse(
         runs.append(by_day(plant.record(), scenario, since=lead * round(site.step / step)))
     days = runs[1].join(runs[0].add_prefix("own_"))
     rules = {time: rule for time, rule in recorded.rules.items() if time >= first}
-    days = days.assign(promised=_promised(rules, site.plant.location.timezone)).loc[whole]
+    days = days.assign(promised=_promised(rules, site)).loc[whole]
     counted = round(len(whole) * DAY / site.step)
     lost = max(counted - sum(t.normalize() in whole for t in _local(times, site)), 0)
     return Rehearsal(site.file.name, days, _currency(site), counted, lost)
 
 
 def _local(times: Sequence[float], site: Site) -> pd.DatetimeIndex:
-    return pd.to_datetime(list(times), unit="s", utc=True).tz_convert(site.plant.location.timezone)
+    return pd.to_datetime(times, unit="s", utc=True).tz_convert(site.plant.location.timezone)
 
 
 def _whole_days(times: Sequence[float], site: Site) -> pd.DatetimeIndex:
@@ -308,10 +308,9 @@ def _currency(site: Site) -> str:
     return "" if site.plant.prices is None else site.plant.prices.currency
 
 
-def _promised(rules: Mapping[float, tuple[float, float]], timezone: str) -> pd.Series:
+def _promised(rules: Mapping[float, tuple[float, float]], site: Site) -> pd.Series:
     """Share that the plans of a day expect to save, weighted by what the rule costs over their horizons [-]."""
-    index = pd.to_datetime(list(rules), unit="s", utc=True).tz_convert(timezone)
-    table = pd.DataFrame(list(rules.values()), index=index, columns=["rule", "saving"])
+    table = pd.DataFrame(list(rules.values()), index=_local(list(rules), site), columns=["rule", "saving"])
     table["saved"] = table["rule"] * table["saving"]
     daily = table.resample("1D").sum()
     return daily["saved"] / daily["rule"].where(daily["rule"] > 0.0)

@@ -24,8 +24,8 @@ BREAKS: set[str] = set()  # those whose end is not survived
 class Memory(dict[str, bytes]):
     """Keeps stages in memory."""
 
-    def read(self, name: str) -> bytes | None:
-        return self.get(name)
+    def read(self, name: str) -> bytes:
+        return self[name]
 
     def write(self, name: str, content: bytes) -> None:
         self[name] = content

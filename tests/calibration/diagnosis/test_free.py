@@ -80,8 +80,8 @@ def test_a_wrong_drawing_is_said_to_be_wrong_and_the_search_goes_on_without_it()
 class OneMore(dict[str, bytes]):
     """Keeps one stage more than the attempt before, which ends with it."""
 
-    def read(self, name: str) -> bytes | None:
-        return self.get(name)
+    def read(self, name: str) -> bytes:
+        return self[name]
 
     def write(self, name: str, content: bytes) -> None:
         self[name] = content
