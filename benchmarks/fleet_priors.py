@@ -3,9 +3,10 @@
 Buildings of one population (`_fleet`: generated offices of 80 m2 and 2 zones, half-hourly, winter, our own model as
 plant; true parameters are drawn about a centre that is not the drawing's). The training fleet is calibrated on 14 days
 and held out on 7, by a Kalman filter's innovations, which draw most from few days, and its population learned from its
-data set (`calibration.fleet.priors`). The test fleet has other seeds; each of its buildings is calibrated on 14 days, on the last 3 of them, and on these 3 with the fleet's priors,
-and judged on the same 7 days that follow. A case of 3 days holds no telemetry from before them. All but the first two
-are done twice, with errors 6 h ahead as the objective, the default, and with innovations.
+data set (`calibration.fleet.priors`). The test fleet has other seeds; each of its buildings is calibrated on 14 days,
+on the last 3 of them, and on these 3 with the fleet's priors, and judged on the same 7 days that follow. A case of 3
+days holds no telemetry from before them. All but the first two are done twice, with errors 6 h ahead as the objective,
+the default, and with innovations.
 
 The centre of the population lies 0.8 of the priors' deviations off the drawing, and its spread is 0.25: the gain is
 that of such a fleet, and would be smaller where buildings are less alike; the line of the true centre as prior (what an
