@@ -1,10 +1,10 @@
-"""What a controller's process that begins anew is told of the time before: the inputs of its last plans."""
+"""What the controller's logs say of the time before: the plans on record, and the past that a new process is told."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,40 @@ from mpc.live.audit import log_files
 
 #: How far back is looked [s]: walls and slabs remember a day or two.
 SPAN = 2 * 86400.0
+
+
+def plans_on_record(
+    folder: Path, *, newest_first: bool = False
+) -> Iterator[tuple[float, dict[str, Any], dict[str, Any], dict[str, float | None]]]:
+    """Read the plans in the controller's logs; a line that cannot be read is left out: the log is not judged here.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the logs.
+    newest_first : bool
+        Whether the last plan comes first. Default: the first.
+
+    Yields
+    ------
+    tuple
+        Begin of the step that was planned [s], the inputs, the plan, and what was forecast for that step by column,
+        empty where there was no forecast.
+    """
+    files = log_files(folder, "controller")
+    for path in reversed(files) if newest_first else files:
+        lines = path.read_bytes().splitlines()
+        for line in reversed(lines) if newest_first else lines:
+            if b'"kind":"plan"' not in line:
+                continue
+            try:
+                content = json.loads(line)["content"]
+                inputs, plan = content["inputs"], content["plan"]
+                begin, forecast = float(inputs["begin"]), inputs["forecast"] or {"columns": [], "values": []}
+                first = {n: values[0] for n, values in zip(forecast["columns"], forecast["values"], strict=True)}
+            except (ValueError, KeyError, TypeError, IndexError):
+                continue
+            yield begin, inputs, plan, first
 
 
 def recent_past(folder: Path, begin: float, columns: Sequence[str]) -> list[dict[str, Any]]:
@@ -32,27 +66,16 @@ def recent_past(folder: Path, begin: float, columns: Sequence[str]) -> list[dict
     -------
     list of dict
         ``begin`` [s], ``means`` of the step before it by column, and ``ahead``: what was forecast for the step after
-        it, by column. A line that cannot be read is left out: the log is not judged here.
+        it, by column.
     """
     wanted, found = set(columns), dict[float, dict[str, Any]]()
-    for path in reversed(log_files(folder, "controller")):
-        for line in reversed(path.read_bytes().splitlines()):
-            if b'"kind":"plan"' not in line:
-                continue
-            try:
-                inputs = json.loads(line)["content"]["inputs"]
-                at, forecast = float(inputs["begin"]), inputs["forecast"]
-                means = {name: value for name, value in inputs["means"].items() if name in wanted}
-                ahead = {} if forecast is None else {
-                    name: values[0] for name, values in zip(forecast["columns"], forecast["values"], strict=True)
-                    if "comfort" not in name and "price" not in name
-                }  # fmt: skip
-            except (ValueError, KeyError, TypeError, IndexError):
-                continue
-            if at < begin - SPAN:
-                return [found[t] for t in sorted(found)]
-            if at < begin:
-                found.setdefault(at, {"begin": at, "means": means, "ahead": ahead})
+    for at, inputs, _, first in plans_on_record(folder, newest_first=True):
+        if at < begin - SPAN:
+            break
+        if at < begin:
+            means = {name: value for name, value in (inputs.get("means") or {}).items() if name in wanted}
+            ahead = {name: value for name, value in first.items() if "comfort" not in name and "price" not in name}
+            found.setdefault(at, {"begin": at, "means": means, "ahead": ahead})
     return [found[t] for t in sorted(found)]
 
 

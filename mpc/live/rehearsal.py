@@ -7,7 +7,6 @@ controls are run through the days in closed loop, with the weather that was meas
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -25,9 +24,8 @@ from mpc.adapters.described.conditions import SeriesGains
 from mpc.baselines.rules import OutdoorReset
 from mpc.errors import LiveError
 from mpc.kpi.daily import by_day
-from mpc.live.audit import log_files
 from mpc.live.building import believed, own_rule
-from mpc.live.past import past_table
+from mpc.live.past import past_table, plans_on_record
 from mpc.live.planner import Planner, forecast_of_dict
 from mpc.live.site import Site
 from mpc.live.site_file import BuildingModel
@@ -231,28 +229,20 @@ def _recorded(folder: Path, begin: pd.Timestamp | None, end: pd.Timestamp | None
     low = -math.inf if begin is None else begin.timestamp() - _WEEK * DAY
     high = math.inf if end is None else end.timestamp()
     past, found = dict[float, dict[str, Any]](), _Recorded([], {}, {}, {}, [])
-    for path in log_files(folder, "controller"):
-        with path.open("rb") as lines:
-            for line in lines:
-                if b'"kind":"plan"' not in line:
-                    continue
-                try:
-                    content = json.loads(line)["content"]
-                    inputs, plan = content["inputs"], content["plan"]
-                    at, forecast = float(inputs["begin"]), inputs["forecast"]
-                    found.ends[:] = [min([at, *found.ends]), max([at, *found.ends])]
-                    if not low <= at < high or forecast is None:
-                        continue
-                    row = dict(zip(forecast["columns"], (values[0] for values in forecast["values"]), strict=True))
-                    found.forecasts[at] = forecast_of_dict(forecast)
-                except (ValueError, KeyError, TypeError, IndexError):
-                    continue
-                found.now[at] = row
-                weather = {name: row.get(name) for name in WEATHER_POINTS if name in row}
-                past[at] = {"begin": at, "means": inputs["means"], "ahead": weather}
-                rule = (plan.get("ahead") or {}).get("rule")
-                if rule is not None:
-                    found.rules[at] = float(rule["rule"]), float(rule["saving"])
+    for at, inputs, plan, row in plans_on_record(folder):
+        found.ends[:] = [min([at, *found.ends]), max([at, *found.ends])]
+        if not low <= at < high or not row:
+            continue
+        try:
+            found.forecasts[at] = forecast_of_dict(inputs["forecast"])
+        except (ValueError, KeyError, TypeError):
+            continue
+        found.now[at] = row
+        weather = {name: row[name] for name in WEATHER_POINTS if name in row}
+        past[at] = {"begin": at, "means": inputs.get("means") or {}, "ahead": weather}
+        rule = (plan.get("ahead") or {}).get("rule")
+        if rule is not None:
+            found.rules[at] = float(rule["rule"]), float(rule["saving"])
     found.past.extend(past[at] for at in sorted(past))
     return found
 
