@@ -32,6 +32,9 @@ _LEAST = 0.01
 #: Eigenvalue of a covariance, on the estimation scale, that rounding may take below zero [-].
 _SMALL = 1e-9
 
+#: Draws for one that lies within the parameters' ranges; the last counts, cut at them.
+_TRIES = 100
+
 
 @dataclass(frozen=True)
 class Possible:
@@ -58,7 +61,7 @@ class Possible:
     covariance: FloatArray
 
     def draw(self, building: Building, count: int, rng: np.random.Generator) -> list[dict[str, float]]:
-        """Draw parameters within their ranges, by name [parameter units].
+        """Draw parameters by name [parameter units]: of those within all ranges, where they are to be had.
 
         Parameters
         ----------
@@ -80,12 +83,15 @@ class Possible:
         CalibrationError.unless(not other, "posterior", f"parameters of {building.name}", found)
         estimated = [parameters[name] for name in self.estimated]
         likely = np.array([p.transform(self.values[p.name]) for p in estimated])
-        points = rng.multivariate_normal(likely, self.covariance, size=count, method="eigh")
-        return [
-            dict(self.values)
-            | {p.name: float(np.clip(p.inverse(z), p.lower, p.upper)) for p, z in zip(estimated, point, strict=True)}
-            for point in points.tolist()
-        ]
+        lower, upper = np.array([[p.lower, p.upper] for p in estimated]).reshape(-1, 2).T
+        drawn = list[dict[str, float]]()
+        for _ in range(count):
+            points = rng.multivariate_normal(likely, self.covariance, size=_TRIES, method="eigh").T
+            tried = np.array([[p.inverse(z) for z in row] for p, row in zip(estimated, points, strict=True)])
+            inside = ((tried >= lower[:, None]) & (tried <= upper[:, None])).all(axis=0)
+            taken = np.clip(tried[:, int(np.argmax(inside)) if inside.any() else -1], lower, upper)
+            drawn.append(dict(self.values) | dict(zip(self.estimated, taken.tolist(), strict=True)))
+        return drawn
 
 
 @dataclass(frozen=True)
@@ -204,9 +210,8 @@ def _chances(diagnosis: Diagnosis) -> list[tuple[float, Fit]]:
 
 def _possible(probability: float, fit: Fit, diagnosis: Diagnosis) -> Possible:
     names = tuple(p.name for p in fit.problem.parameters)
-    covariance = np.linalg.inv(fit.found.jacobian.T @ fit.found.jacobian)
     settings = replace(fit.settings, effects=fit.effects, normalisation=diagnosis.settings.normalisation)
-    return Possible(probability, settings, fit.values, names, np.asarray(covariance))
+    return Possible(probability, settings, fit.values, names, fit.covariance)
 
 
 def read_posterior(path: str | Path) -> Posterior:

@@ -155,9 +155,14 @@ class Fit:
         return float(np.sqrt(np.nanmean((zone[steps:] - zone[:-steps]) ** 2)))
 
     @cached_property
+    def covariance(self) -> FloatArray:
+        """Covariance of the parameters on the estimation scale, shape (n_parameter, n_parameter) [-]."""
+        return np.asarray(np.linalg.inv(self.found.jacobian.T @ self.found.jacobian))
+
+    @cached_property
     def deviations(self) -> FloatArray:
         """Standard errors of the parameters on the estimation scale, shape (n_parameter,) [-]."""
-        return np.asarray(np.sqrt(np.diag(np.linalg.inv(self.found.jacobian.T @ self.found.jacobian))))
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
 
     @cached_property
     def values(self) -> dict[str, float]:

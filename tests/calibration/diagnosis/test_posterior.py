@@ -103,14 +103,15 @@ def test_draws_are_as_wide_as_the_data_leave_them_and_within_their_ranges() -> N
     only = Posterior((one,), None, office().building.zone_names)
     values = [m.values for m in only.draw(office().building, 400, seed=2)]
     parameters = {p.name: p for p in one.settings.network(office().building).parameters}
-    for k, name in enumerate(one.estimated):
-        p = parameters[name]
-        drawn = np.array([v[name] for v in values])
-        assert p.lower <= drawn.min() and drawn.max() <= p.upper
-        inside = (drawn > p.lower) & (drawn < p.upper)
-        if inside.all():
-            scale = np.std([p.transform(float(v)) for v in drawn])
-            assert scale == pytest.approx(np.sqrt(one.covariance[k, k]), rel=0.15), name
+    for name in one.estimated:
+        drawn = [v[name] for v in values]
+        assert parameters[name].lower < min(drawn) and max(drawn) < parameters[name].upper
+    known = replace(one, covariance=one.covariance / 100.0)  # so well that no range cuts it
+    draws = known.draw(office().building, 400, np.random.default_rng(2))
+    scaled = np.array([[parameters[name].transform(v[name]) for v in draws] for name in one.estimated])
+    errors = np.sqrt(np.diag(known.covariance))
+    assert scaled.std(axis=1) == pytest.approx(errors, rel=0.15)
+    assert np.corrcoef(scaled) == pytest.approx(known.covariance / np.outer(errors, errors), abs=0.2)
     first = only.draw(office().building, 1, seed=2)[0]
     settings = PlantSettings(parameters=first, unmeasured=DisturbanceModel(30.0, 3600.0, 0.03))
     plant = simulated_plant(office().building, pilot_weather(1, "2023-01-09", 2.0), "2023-01-09", "2023-01-10", settings)
@@ -118,6 +119,21 @@ def test_draws_are_as_wide_as_the_data_leave_them_and_within_their_ranges() -> N
     assert SUN in [p.effect for p in plant.model.network.parameters]
     again = [m.values for m in only.draw(office().building, 400, seed=2)]
     assert values == again
+
+
+def test_draws_do_not_pile_up_on_a_bound() -> None:
+    one = torn(60.0, 10.0).models[0]
+    parameters = one.settings.network(office().building).parameters
+    k, p = next((k, p) for k, n in enumerate(one.estimated) for p in parameters
+                if p.name == n and np.isfinite(p.transform(p.upper)))  # fmt: skip
+    wide = one.covariance.copy()
+    wide[k, :] = wide[:, k] = 0.0
+    wide[k, k] = 0.25
+    at_bound = replace(one, values=dict(one.values) | {p.name: p.upper}, covariance=wide)
+    drawn = np.array([v[p.name] for v in at_bound.draw(office().building, 200, np.random.default_rng(3))])
+    assert p.lower < drawn.min() and drawn.max() < p.upper
+    below = np.array([p.transform(p.upper) - p.transform(float(v)) for v in drawn])
+    assert np.mean(below) == pytest.approx(0.5 * np.sqrt(2.0 / np.pi), rel=0.15)  # half a normal distribution
 
 
 def test_a_file_holds_all_of_it(tmp_path: Path) -> None:
