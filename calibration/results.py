@@ -20,6 +20,7 @@ import pandas as pd
 
 from calibration.errors import CalibrationError, ResultsExistError
 from thermal.case.load import NAME as CASE_FILE
+from thermal.errors import some_of
 from thermal.folders import check_writable
 
 if TYPE_CHECKING:
@@ -131,9 +132,9 @@ def check_results_folder(out: str | Path, force: bool = False) -> Path:
     if folder.is_dir() and not force:
         held = sorted(path.name for path in folder.iterdir())
         if held:
-            shown = ", ".join(held[:4]) + (f" and {len(held) - 4} more" if len(held) > 4 else "")
             raise ResultsExistError(
-                f"{folder}: expected an empty or new folder, found {shown}; choose another, or --force (force=True)"
+                f"{folder}: expected an empty or new folder, found {some_of(held, most=4)}; choose another, or "
+                "--force (force=True)"
             )
     return folder
 

@@ -138,5 +138,28 @@ def nearest(word: object, options: Iterable[object]) -> str:
         return f"the nearest valid one is {folded[match[0]]!r}"
     if not names:
         return "there is none to choose from"
-    shown = ", ".join(names[:8])
-    return f"valid: {shown}" + (f" and {len(names) - 8} more" if len(names) > 8 else "")
+    return f"valid: {some_of(names, most=8)}"
+
+
+def some_of(names: Iterable[str], most: int = 3) -> str:
+    """Write some names, and how many more there are.
+
+    Parameters
+    ----------
+    names
+        Names.
+    most
+        How many are written.
+
+    Returns
+    -------
+    str
+        With commas.
+
+    Examples
+    --------
+    >>> some_of("abcd", most=2)
+    'a, b and 2 more'
+    """
+    known = list(names)
+    return ", ".join(known[:most]) + (f" and {len(known) - most} more" if len(known) > most else "")

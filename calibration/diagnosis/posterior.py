@@ -24,7 +24,7 @@ from calibration.evaluation.settings import ModelSettings, told_settings
 from calibration.results import plain
 from thermal._types import FloatArray
 from thermal.case.building import Building
-from thermal.case.plausibility.anomaly import listed
+from thermal.errors import some_of
 
 #: Probability below which a set of effects is left out [-].
 _LEAST = 0.01
@@ -79,7 +79,7 @@ class Possible:
         """
         parameters = {p.name: p for p in self.settings.network(building).parameters}
         other = sorted(set(self.values) ^ set(parameters))
-        found = f"those of another: {listed(other, most=3)}"
+        found = f"those of another: {some_of(other, most=3)}"
         CalibrationError.unless(not other, "posterior", f"parameters of {building.name}", found)
         estimated = [parameters[name] for name in self.estimated]
         likely = np.array([p.transform(self.values[p.name]) for p in estimated])
@@ -139,8 +139,8 @@ class Posterior:
         """
         same = tuple(building.zone_names) == self.zones
         advice = "give the building that the diagnosis was made of"
-        CalibrationError.unless(same, "posterior", f"a building with the zones {listed(self.zones, most=3)}",
-                                f"{building.name} with {listed(building.zone_names, most=3)}", advice)  # fmt: skip
+        CalibrationError.unless(same, "posterior", f"a building with the zones {some_of(self.zones, most=3)}",
+                                f"{building.name} with {some_of(building.zone_names, most=3)}", advice)  # fmt: skip
         rng, drawn = np.random.default_rng(seed), list[DrawnModel]()
         counts = rng.multinomial(count, [one.probability for one in self.models])
         for one, times in zip(self.models, counts.tolist(), strict=True):

@@ -23,6 +23,7 @@ from calibration.fleet.settings import Settings
 from calibration.progress import Progress
 from calibration.results import check_results_folder, to_json
 from thermal.case.load import NAME
+from thermal.errors import some_of
 
 #: File in the folder of results with an entry a case.
 SUMMARY = "summary.json"
@@ -207,10 +208,9 @@ def _refuse_other_contents(out: Path) -> None:
     held = sorted(path for path in out.iterdir() if not path.name.startswith(".")) if out.is_dir() else []
     other = [path.name for path in held if not _is_of_all(path) and not (path / RECORD).is_file()]
     if other:
-        shown = ", ".join(other[:4]) + (f" and {len(other) - 4} more" if len(other) > 4 else "")
         raise ResultsExistError(
-            f"{out}: expected a new folder, or results of an earlier run to go on with, found {shown}; choose another, "
-            "or --force (force=True)"
+            f"{out}: expected a new folder, or results of an earlier run to go on with, found "
+            f"{some_of(other, most=4)}; choose another, or --force (force=True)"
         )
 
 

@@ -25,7 +25,7 @@ from thermal.case.emitters import is_heater
 from thermal.case.plan import check_plan, facade_areas
 from thermal.case.telemetry import Telemetry
 from thermal.components.registry import device_types
-from thermal.errors import CaseError, nearest
+from thermal.errors import CaseError, nearest, some_of
 
 _ZONE, _DEVICE = "a zone of the building", "a device of the building"
 RESERVED = frozenset({OUTDOOR, GROUND, *PLAN_TOKENS})
@@ -309,8 +309,7 @@ def _on_devices(building: Building, columns: set[str]) -> Iterator[str]:
     for what, meaning in _TOLD.items():
         named = [own.device for own in commanded if own.kind == what]
         if named:
-            more = f" and {len(named) - _NAMED} more" if len(named) > _NAMED else ""
-            yield f"heat that no meter tells is fitted to {meaning}: {', '.join(named[:_NAMED])}{more}"
+            yield f"heat that no meter tells is fitted to {meaning}: {some_of(named, _NAMED)}"
     told = {own.device for own in commanded} | {column.partition("/")[0] for own in commanded for column in own.columns}
     for name, kind in unknown_device_types(building).items():
         yield f"device {name!r} has the unknown type {kind!r} ({nearest(kind, device_types())})"

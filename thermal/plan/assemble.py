@@ -9,7 +9,7 @@ from scipy.signal import fftconvolve
 from thermal._types import FloatArray
 from thermal.case.building import FloorPlan, FloorPlans
 from thermal.case.plan import check_plan, facade_areas, zone_floor_areas
-from thermal.errors import LostRoomError, PlanError
+from thermal.errors import LostRoomError, PlanError, some_of
 from thermal.plan.cells import ZonedFloor, distinct_names, draw_cells
 from thermal.plan.guard import checked_number
 from thermal.plan.windows import clipped_glazing
@@ -149,10 +149,9 @@ class PlanImport:
             found.append(f"drawings were turned upright by angles far apart ({listed}): is 'up' the same on all?")
         coarse = [zone for zone, error in self.area_errors.items() if abs(error) > AREA_TOLERANCE]
         if coarse:
-            shown = ", ".join(coarse[:5]) + (f" and {len(coarse) - 5} more" if len(coarse) > 5 else "")
             found.append(
                 f"cells of {self.plans.cell_size:g} m miss the area of {len(coarse)} zones by over "
-                f"{AREA_TOLERANCE:.0%} ({shown}): choose smaller cells"
+                f"{AREA_TOLERANCE:.0%} ({some_of(coarse, most=5)}): choose smaller cells"
             )
         return tuple(found)
 

@@ -1,6 +1,5 @@
 """An anomaly: what in a case can hardly be true, where, how sure that is, and what to do."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -48,27 +47,3 @@ class Anomaly:
     def __str__(self) -> str:
         """Sentence: what, how sure, what to do."""
         return f"{self.what} ({self.certainty}); {self.advice}"
-
-
-def listed(names: Iterable[str], most: int = 3) -> str:
-    """Write some names, and how many more there are.
-
-    Parameters
-    ----------
-    names
-        Names.
-    most
-        How many are written.
-
-    Returns
-    -------
-    str
-        With commas.
-
-    Examples
-    --------
-    >>> listed("abcd", most=2)
-    'a, b and 2 more'
-    """
-    known = list(names)
-    return ", ".join(known[:most]) + (f" and {len(known) - most} more" if len(known) > most else "")

@@ -7,8 +7,9 @@ import pandas as pd
 
 from thermal.case.case import Case
 from thermal.case.plan import zone_sizes
-from thermal.case.plausibility.anomaly import Anomaly, Certainty, Severity, listed
+from thermal.case.plausibility.anomaly import Anomaly, Certainty, Severity
 from thermal.case.points import OUTDOOR_TEMPERATURE, SUPPLY_FLOW, ZONE_TEMPERATURE
+from thermal.errors import some_of
 from thermal.units import AIR_HEAT_CAPACITY, air_density
 
 #: Air changes of a zone by its supply air, 1 % of the time exceeded [1/h]: offices have 2 to 10, operating theatres
@@ -68,8 +69,8 @@ def magnitudes(case: Case) -> Iterator[Anomaly]:
     for (impossible, side), found in groups.items():
         columns, typical = tuple(c for c, _ in found), float(np.median([changes for _, changes in found]))
         units = [unit for unit, factor in FLOW_UNITS.items() if 0.5 <= typical / factor <= 20.0]
-        looks = f"; they look like {listed(units)}" if units else ""
-        what = f"supply air changes the air of its zones {_rounded(typical)} times an hour: {listed(columns)}{looks}"
+        looks = f"; they look like {some_of(units)}" if units else ""
+        what = f"supply air changes the air of its zones {_rounded(typical)} times an hour: {some_of(columns)}{looks}"
         advice = "correct the unit of supply_air_flowrate_sensor under 'units', or the volume of the zones"
         certainty: Certainty = "certain" if impossible else "likely" if side == "low" else "possible"
         yield Anomaly("unit", "error" if impossible else "warning", certainty, columns, *_ends(frame), what, advice)
@@ -96,7 +97,7 @@ def _heat(heat: pd.DataFrame, sizes: dict[str, tuple[float, float]]) -> Iterator
     if by_area:
         worst = max(by_area.values())
         impossible = worst > IMPOSSIBLE_HEAT
-        what = f"heat of up to {_rounded(worst)} W by m2 of floor in {listed(by_area)}"
+        what = f"heat of up to {_rounded(worst)} W by m2 of floor in {some_of(by_area)}"
         advice = "correct the unit of heat or flow, or the floor area"
         severity: Severity = "error" if impossible else "warning"
         sure: Certainty = "certain" if impossible else "possible"

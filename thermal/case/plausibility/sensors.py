@@ -6,8 +6,9 @@ from itertools import combinations
 import numpy as np
 
 from thermal.case.case import Case
-from thermal.case.plausibility.anomaly import Anomaly, Certainty, listed
+from thermal.case.plausibility.anomaly import Anomaly, Certainty
 from thermal.case.points import OUTDOOR_TEMPERATURE, POINT_TYPES, SUPPLY_FLOW, ZONE_TEMPERATURE, split_column
+from thermal.errors import some_of
 from thermal.units import QUANTITIES, from_si
 
 CO2, HUMIDITY = "zone_air_co2_concentration_sensor", "_air_relative_humidity_sensor"
@@ -80,7 +81,7 @@ def out_of_range(case: Case) -> Iterator[Anomaly]:
         names, middle = tuple(column for column, _ in columns), float(np.median([median for _, median in columns]))
         quantity = POINT_TYPES[name].quantity
         what = (
-            f"{listed(names)}: over {100 * IMPOSSIBLE_SHARE:.0f} % of the values are impossible "
+            f"{some_of(names)}: over {100 * IMPOSSIBLE_SHARE:.0f} % of the values are impossible "
             f"(median {middle:.4g} {QUANTITIES[quantity].file_unit})"
         )
         advice = f"correct the unit of {name} under 'units'{_hint(quantity, middle)}, or the sensor"

@@ -5,10 +5,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from thermal.case.case import Case
-from thermal.case.plausibility.anomaly import Anomaly, Certainty, Severity, listed
+from thermal.case.plausibility.anomaly import Anomaly, Certainty, Severity
 from thermal.case.points import HEATING_POWER, OUTDOOR_TEMPERATURE, SUPPLY_FLOW, ZONE_TEMPERATURE
 from thermal.case.quality import FLAT
 from thermal.case.signal_faults import runs
+from thermal.errors import some_of
 
 #: What moves from hour to hour, out of doors and where people breathe: a day at one value, to the last digit, is no
 #: measurement. Sun at night and calm are excepted by what they are: a whole day holds a noon, and calm is zero.
@@ -50,7 +51,7 @@ def standstills(case: Case) -> Iterator[Anomaly]:
     constant = [c for c, values in seen.items() if values.size and np.ptp(values) == 0.0]
     temperatures = [c for c in seen if c.endswith((f"/{ZONE_TEMPERATURE}", f"/{OUTDOOR_TEMPERATURE}")) and seen[c].size]
     if temperatures and {*temperatures} <= {*constant}:
-        what = f"all temperatures stand still: {listed(temperatures)} never change"
+        what = f"all temperatures stand still: {some_of(temperatures)} never change"
         advice = "export the telemetry anew: there is nothing to fit"
         yield Anomaly("standstill", "error", "certain", tuple(constant), stamps[0], stamps[-1], what, advice)
         return
