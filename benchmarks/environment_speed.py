@@ -3,11 +3,13 @@
 A step is 5 minutes of the plant under random actions of a seed, its measurements with noise, the forecast, the clock
 and the reward. Beside it the plant alone, and the plant with its measurements read; a loop of single environments; the
 vector environment, in single precision, as plain NumPy and compiled by numba (extra ``[fast]``), with one building for
-all and with a building for each. Noise is drawn as it is needed and counts. Times are CPU times of the process on one
-thread, best of some stretches; the time that a compiled environment takes to be made stands beside it.
+all and with a building for each; with ``--peers`` also environments of others (`_peer_environments`), which have other
+buildings, physics and steps, as they come. Noise is drawn as it is needed and counts. Times are CPU times of the
+process on one thread, of a peer with all its threads, best of some stretches; the time that a compiled environment
+takes to be made stands beside it.
 
-Run: ``python benchmarks/environment_speed.py --out results/environment``; two minutes. Writes
-``environment_speed.json`` and ``.md``.
+Run: ``python benchmarks/environment_speed.py --out results/environment [--peers] [--publish]``; two minutes, with peers
+five more, most of it to install them. Writes ``environment_speed.json`` and ``.md``.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from _peer_environments import peer_rates
 from _table import markdown, write
 from simulator_speed import use_one_thread
 
@@ -120,13 +123,16 @@ def main(arguments: list[str] | None = None) -> dict[str, dict[str, float]]:
     parser.add_argument("--members", type=int, default=MEMBERS, help="environments at once")
     parser.add_argument("--zones", type=int, nargs="*", default=list(OFFICES), choices=list(OFFICES), help="offices")
     parser.add_argument("--plain", action="store_true", help="leave out what numba compiles")
+    parser.add_argument("--peers", action="store_true", help="install environments of others, and step them beside")
     parser.add_argument("--publish", action="store_true", help="replace the table between its marks")
     options = parser.parse_args(arguments)
     compiled = not options.plain and find_spec("numba") is not None
     found = {str(z): compare(z, options.steps, options.members, compiled) for z in options.zones}
+    if options.peers:
+        found |= peer_rates(options.out / "peers")
     rows = [[zones, name, f"{rate:,.0f}", "" if "CPU s" in name else f"{1e6 / rate:.2f}"]
             for zones, rates in found.items() for name, rate in rates.items()]  # fmt: skip
-    note = f"Steps of 5 minutes, one core; load average {os.getloadavg()[0]:.1f}.\n"
+    note = f"Steps of 5 minutes where no other is told, one core; load average {os.getloadavg()[0]:.1f}.\n"
     text = markdown(("zones", "what", "steps a second", "µs a step"), rows) + "\n" + note
     write(options.out, "environment_speed", text, found, options.publish)
     print(text)
