@@ -51,12 +51,12 @@ def entries(site: Site, prices: tuple[float, ...], policies: Path) -> list[Entry
     learned = sorted(path.stem for path in policies.glob("*.npz"))
     fronts = [Entry(name, price) for name in site.optimal for price in prices]
     peers = site.peers if find_spec("do_mpc") is not None else ()  # of the extra [benchmarks]
-    return [*map(Entry, site.rules), *fronts, *map(Entry, peers), *map(Entry, learned)]
+    return [*map(Entry, site.rules), *fronts, *map(Entry, (*site.sampling, *peers, *learned))]
 
 
 def controller_of(entry: Entry, site: Site, plant: ScenarioPlant, policies: Path) -> Controller:
     """Make a controller."""
-    if entry.controller in (*site.rules, *site.optimal, *site.peers):
+    if entry.controller in (*site.rules, *site.optimal, *site.sampling, *site.peers):
         return site.controller(entry.controller, entry.price * site.discomfort_price, plant)
     network, world = ActorNetwork.load(policies / f"{entry.controller}.npz"), site.world_of(plant)
     return PolicyController(network, world.layout, world.actions)

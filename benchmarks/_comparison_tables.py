@@ -23,6 +23,7 @@ NAMES = {
     "schedule": "schedule", "reset": "outdoor reset", "guideline36": "Guideline 36",
     "mpc_before": "MPC, model before diagnosis",
     "mpc_after": "MPC, model after diagnosis", "bound": "MPC that knows everything",
+    "mpc_sampling": "MPC by sampling plans, model after diagnosis",
     "ppo_before": "PPO, trained in the model, moved to the plant", "ppo_plant": "PPO, trained on the plant",
     "sac_before": "SAC, trained in the model, moved to the plant", "sac_plant": "SAC, trained on the plant",
     "ppo_after": "PPO, trained in the diagnosed model, moved to the plant",

@@ -46,7 +46,7 @@ from mpc.scenario.gains import InternalGains
 from mpc.scenario.grid import StepGrid
 from mpc.scenario.scenario import Scenario, build_scenario
 from mpc.scenario.tariff import paper_carbon, paper_tariff
-from mpc.studies.optimal_control import default_horizon, make_controller, site_points
+from mpc.studies.optimal_control import default_horizon, make_controller, make_sampling_controller, site_points
 from mpc.studies.registry import KnownState
 from thermal import Building, Case
 from thermal.effects.catalogue import chosen
@@ -159,6 +159,7 @@ class OfficeSite(Site):
     budget: ClassVar[Mapping[str, int]] = {"ppo": 150_000, "sac": 30_000}
     rules = ("floor", "schedule", "reset", "guideline36")
     optimal = ("mpc_before", "mpc_after", "bound")
+    sampling = ("mpc_sampling",)
     #: do-mpc, and our solver on the very problem that do-mpc solves.
     peers = ("do_mpc", "mpc_as_do_mpc")
     #: Weather of seeds that nothing else has.
@@ -210,6 +211,9 @@ class OfficeSite(Site):
                 horizon=default_horizon(plant.control_step, HORIZON_HOURS),
                 observer=KnownState(model, plant) if name == "bound" else None,
             )  # fmt: skip
+        if name in self.sampling:
+            settings = ControllerSettings(comfort_price=price)
+            return make_sampling_controller(known_model("after", self.size), plant, settings=settings, hours=HORIZON_HOURS)
         required = tuple(a for a in plant.actuators if a.required)
         points = site_points(office(self.size), plant.devices)
         if name == "floor":

@@ -37,8 +37,9 @@ class Site(ABC):
         Of a kelvin hour of a zone, of training and of the stage cost that all are judged by [currency/K/h].
     reward_scale : float
         Of policies: returns come to some ten [1/currency].
-    rules, optimal, peers : tuple of str
-        Names of controllers that do not learn; peers are run for a day of each week only.
+    rules, optimal, sampling, peers : tuple of str
+        Names of controllers that do not learn; sampling ones are run at one price of discomfort, peers for a day of
+        each week only.
     test_weeks, validation_weeks, training_weeks : mapping of str to tuple
         By name: weeks that all are judged on, that training curves are judged on, and that policies are trained on.
     budget : mapping of str to int
@@ -53,6 +54,7 @@ class Site(ABC):
     reward_scale: ClassVar[float]
     rules: ClassVar[tuple[str, ...]]
     optimal: ClassVar[tuple[str, ...]]
+    sampling: ClassVar[tuple[str, ...]] = ()
     peers: ClassVar[tuple[str, ...]]
     test_weeks: ClassVar[Mapping[str, Week]]
     validation_weeks: ClassVar[Mapping[str, Week]]
@@ -100,7 +102,7 @@ class Site(ABC):
         Parameters
         ----------
         name : str
-            Of `rules`, `optimal` or `peers`.
+            Of `rules`, `optimal`, `sampling` or `peers`.
         price : float
             Of discomfort, without effect on rules [currency/K/h].
         plant : ScenarioPlant

@@ -7,6 +7,7 @@ measurements and the same forecasts. Lines:
 
 - least action, and the rules of the building: schedule, outdoor reset, ASHRAE Guideline 36, or EnergyPlus' own;
 - MPC with the model before diagnosis (the calibrated baseline) and after, untuned, at three prices of discomfort;
+- in our office MPC that samples plans on the batched plant, with the model after diagnosis;
 - in our office do-mpc with the model after diagnosis, and ours on the problem that do-mpc solves, on a day of each
   week; and MPC that knows state, model, weather and people, with exact sensors: a bound but for the valleys of its
   problem. EnergyPlus' state nobody knows: there is no bound there;
