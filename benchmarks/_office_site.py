@@ -212,8 +212,8 @@ class OfficeSite(Site):
                 observer=KnownState(model, plant) if name == "bound" else None,
             )  # fmt: skip
         if name in self.sampling:
-            settings = ControllerSettings(comfort_price=price)
-            return make_sampling_controller(known_model("after", self.size), plant, settings=settings, hours=HORIZON_HOURS)
+            model, settings = known_model("after", self.size), ControllerSettings(comfort_price=price)
+            return make_sampling_controller(model, plant, settings=settings, hours=HORIZON_HOURS)
         required = tuple(a for a in plant.actuators if a.required)
         points = site_points(office(self.size), plant.devices)
         if name == "floor":
