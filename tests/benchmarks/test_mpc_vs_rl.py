@@ -182,11 +182,13 @@ def random_policy(case: ModuleType, folder: Path) -> None:
 def test_smoke_of_the_comparison(case: ModuleType, comparison: ModuleType, tmp_path: Path) -> None:
     random_policy(case, tmp_path)
     asked = ["--out", str(tmp_path / "out"), "--policies", str(tmp_path), "--weeks", "winter", "--smoke",
-             "--prices", "1", "--controllers", "reset", "guideline36", "mpc_after", "sac_plant_0"]  # fmt: skip
+             "--prices", "1", "--controllers", "reset", "guideline36", "mpc_after", "mpc_sampling",
+             "sac_plant_0"]  # fmt: skip
     first = comparison.main(asked)
     by = {row["entry"]["controller"]: row for row in first}
-    assert set(by) == {"reset", "guideline36", "mpc_after", "sac_plant_0"}
-    assert by["mpc_after"]["sources"] == {"optimal plan": 96}
+    assert set(by) == {"reset", "guideline36", "mpc_after", "mpc_sampling", "sac_plant_0"}
+    assert by["mpc_after"]["sources"] == by["mpc_sampling"]["sources"] == {"optimal plan": 96}
+    assert by["mpc_sampling"]["cost"] < 1.3 * by["mpc_after"]["cost"]
     site = case.OfficeSite(case.SMOKE)
     price, zones = site.discomfort_price, site.size.zones
     for row in first:
@@ -194,7 +196,7 @@ def test_smoke_of_the_comparison(case: ModuleType, comparison: ModuleType, tmp_p
     text = (tmp_path / "out" / "mpc_vs_rl.md").read_text()
     assert "SAC, trained on the plant | 1 |" in text
     rows = comparison.short(site, first).splitlines()
-    assert len(rows) == 6 and rows[4].startswith("| MPC, model after diagnosis |") and rows[4].endswith("|  |")
+    assert len(rows) == 7 and rows[4].startswith("| MPC, model after diagnosis |") and rows[4].endswith("|  |")
     stamps = {file: file.stat().st_mtime_ns for file in (tmp_path / "out" / "office").iterdir()}
     assert comparison.main(asked) == first
     assert stamps == {file: file.stat().st_mtime_ns for file in (tmp_path / "out" / "office").iterdir()}
