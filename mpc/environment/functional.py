@@ -168,9 +168,15 @@ class FunctionalEnvironment:
         noise = [jax.random.normal(k, (self._noise, len(state.step)), dtype) for k in keys]
         state, measured, reward = self.advance(state, actions, noise)
         final, ended = self.observe(state, measured), state.step >= self.tables.ends[state.beginning]
-        fresh, first = self.reset(again, len(state.step))
-        state = jax.tree.map(lambda new, old: jnp.where(ended, new, old), fresh, state)
-        return state, jnp.where(ended[:, None], first, final), reward, ended, final
+
+        def begun(state: EpisodeState, seen: Any) -> tuple[EpisodeState, Any]:
+            fresh, first = self.reset(again, len(state.step))
+            state = jax.tree.map(lambda new, old: jnp.where(ended, new, old), fresh, state)
+            return state, jnp.where(ended[:, None], first, seen)
+
+        # few steps end an episode, and where buildings differ each member's matrices are laid out anew
+        state, seen = jax.lax.cond(ended.any(), begun, lambda *as_they_are: as_they_are, state, final)
+        return state, seen, reward, ended, final
 
     def advance(self, state: EpisodeState, actions: Any, noise: Any) -> tuple[EpisodeState, Any, Any]:
         """Advance the plants by a control step.
