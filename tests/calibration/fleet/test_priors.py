@@ -74,6 +74,47 @@ def test_buildings_unlike_the_others_count_less() -> None:
     np.testing.assert_allclose(np.diag(mixed.covariance), np.diag(clean.covariance), atol=0.1)
 
 
+def film_and_wall(seed: int) -> Member:
+    """What the measured resistance of a wall says of it and of its film, of a twentieth, where its fit has ended."""
+    rng = np.random.default_rng(seed)
+    film, wall = rng.normal([-0.5, 0.5], 0.2)
+    measured = np.log(0.05 * np.exp(film) + np.exp(wall)) + rng.normal(0.0, 0.01)
+    point = np.zeros(2)
+    for _ in range(20):
+        parts = np.array([0.05, 1.0]) * np.exp(point)
+        slope = parts / parts.sum() / 0.01
+        off = (measured - np.log(parts.sum())) / 0.01
+        point = np.linalg.solve(np.outer(slope, slope) + np.eye(2) / 0.49, slope * (off + slope @ point))
+    return Member(f"office {seed}", ("film", "wall"), np.outer(slope, slope), slope * (off + slope @ point))
+
+
+def test_many_that_know_nothing_are_not_sure_of_it_together() -> None:
+    """A slope that differs a little from one estimate to the next would tell of films far outside of their range."""
+    members, ranges = [film_and_wall(seed) for seed in range(800)], {"film": 0.7, "wall": 0.7}
+    few, many = learn_population(members[:50], ranges), learn_population(members, ranges)
+    assert many.mean == pytest.approx([0.0, 0.5], abs=0.1) and few.mean == pytest.approx(many.mean, abs=0.1)
+    assert np.sqrt(np.diag(many.covariance)) == pytest.approx([0.7, 0.2], abs=0.05)
+    together = np.linalg.pinv(sum(m.information for m in members)) @ sum(m.pull for m in members)
+    assert abs(together[0]) > 1.4  # what all of them say as one: two ranges away
+
+
+def test_a_fleet_that_says_nothing_leaves_the_ranges() -> None:
+    silent = [Member(f"{i}", NAMES, np.zeros((3, 3)), np.zeros(3)) for i in range(3)]
+    found = learn_population(silent, RANGES)
+    np.testing.assert_allclose(found.covariance, 0.49 * np.eye(3))
+    assert not found.mean.any() and found.weights.tolist() == [1.0, 1.0, 1.0]
+
+
+def test_what_few_buildings_have_is_learned_from_these() -> None:
+    """A parameter that one building in forty has is as well known as that building tells it."""
+    members, _ = simulated(80, seed=3)
+    points = (0.4, 0.5)
+    rare = [Member(f"pool {x}", ("pool",), np.array([[1e4]]), np.array([1e4 * x])) for x in points]
+    found = learn_population([*members, *rare], RANGES | {"pool": 0.7})
+    at = found.names.index("pool")
+    assert found.mean[at] == pytest.approx(np.mean(points), abs=0.15) and found.covariance[at, at] < 0.35
+
+
 def test_members_of_a_group_say_what_they_have_in_common() -> None:
     """Of facades whose values are exact, their mean is known as far as they spread."""
     rows = [{"base": "wall", "information": [1e9 * (i == j) for j in range(4)], "pull": 1e9 * x, "own_deviation": 0.2}
