@@ -33,7 +33,7 @@ def run_peer(name: str, folder: Path) -> dict[str, Any]:
     subprocess.CalledProcessError
         When it cannot be installed, or does not run.
     """
-    home, (itself, needed) = folder / name, PEERS[name]
+    home, (itself, needed) = folder.resolve() / name, PEERS[name]
     python, ready = home / "bin" / "python", home / "installed"
     clean = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV")}
     if not ready.exists():
@@ -45,8 +45,10 @@ def run_peer(name: str, folder: Path) -> dict[str, Any]:
         ):
             subprocess.run([str(python), "-m", *command], check=True, env=clean)
         ready.touch()
-    ran = subprocess.run(
-        [str(python), str(_SCRIPTS / f"{name}_speed.py"), str(home / "work")],
+    work = home / "work"
+    work.mkdir(exist_ok=True)
+    ran = subprocess.run(  # there: Sinergym leaves EnergyPlus' files where it was begun
+        [str(python), str(_SCRIPTS / f"{name}_speed.py"), str(work)], cwd=work,
         check=True, env=clean, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
     )  # fmt: skip
     told: dict[str, Any] = json.loads(ran.stdout.splitlines()[-1])

@@ -40,7 +40,6 @@ def main() -> None:
     """Step a year's beginning, and count."""
     folder = Path(sys.argv[1]).resolve()
     building = prepare(folder)
-    os.chdir(folder)
     logging.disable(logging.ERROR)
     import gymnasium
 
