@@ -85,9 +85,8 @@ class Possible:
         likely = np.array([p.transform(self.values[p.name]) for p in estimated])
         lower, upper = np.array([[p.lower, p.upper] for p in estimated]).reshape(-1, 2).T
         drawn = list[dict[str, float]]()
-        for _ in range(count):
-            points = rng.multivariate_normal(likely, self.covariance, size=_TRIES, method="eigh").T
-            tried = np.array([[p.inverse(z) for z in row] for p, row in zip(estimated, points, strict=True)])
+        for points in rng.multivariate_normal(likely, self.covariance, size=(count, _TRIES), method="eigh"):
+            tried = np.array([[p.inverse(z) for z in row] for p, row in zip(estimated, points.T, strict=True)])
             inside = ((tried >= lower[:, None]) & (tried <= upper[:, None])).all(axis=0)
             taken = np.clip(tried[:, int(np.argmax(inside)) if inside.any() else -1], lower, upper)
             drawn.append(dict(self.values) | dict(zip(self.estimated, taken.tolist(), strict=True)))

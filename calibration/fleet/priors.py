@@ -16,8 +16,8 @@ physical ranges, counts as ν buildings. Buildings unlike the others count less,
 Such a likelihood is one of its building's own neighbourhood. Where that building's data say next to nothing, as of an
 outside film before a wall that insulates more, the next building's neighbourhood says it a little otherwise, and a
 thousand of them together are sure of what none of them knows. So the population is learned in the directions of which a
-building's data say something, :math:`T_0^{1/2} I_b T_0^{1/2}` on an average; in the others each building has its own
-value, which its range says and which is integrated out.
+building's data say something: in deviations of the ranges, the eigenvectors of the mean of :math:`(1 + I_b)^{-1} I_b`.
+In the others each building has its own value, which its range says and which is integrated out.
 """
 
 from __future__ import annotations
@@ -134,8 +134,8 @@ def learn_population(members: Sequence[Member], ranges: Mapping[str, float]) -> 
         at = [index[name] for name in m.names]
         information[b][np.ix_(at, at)], pull[b][at] = m.information, m.pull
     spread = np.array([ranges[name] for name in names])
-    found = _directions(information * np.outer(spread, spread))
-    told, untold = spread[:, None] * found, np.diag(spread**2) - spread[:, None] * found @ (spread[:, None] * found).T
+    told = spread[:, None] * _directions(information * np.outer(spread, spread))
+    untold = np.diag(spread**2) - told @ told.T
     out = np.linalg.inv(np.eye(size) + information @ untold)
     mean, covariance, weights = _learn(told.T @ out @ information @ told, np.einsum("ik,bij,bj->bk", told, out, pull))
     cases = tuple(m.case for m in members)
