@@ -48,7 +48,7 @@ def run_peer(name: str, folder: Path) -> dict[str, Any]:
     work = home / "work"
     work.mkdir(exist_ok=True)
     ran = subprocess.run(  # there: Sinergym leaves EnergyPlus' files where it was begun
-        [str(python), str(_SCRIPTS / f"{name}_speed.py"), str(work)], cwd=work,
+        [str(python), str(_SCRIPTS / f"{name}_speed.py")], cwd=work,
         check=True, env=clean, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
     )  # fmt: skip
     told: dict[str, Any] = json.loads(ran.stdout.splitlines()[-1])
@@ -60,8 +60,8 @@ def peer_rates(folder: Path) -> dict[str, dict[str, float]]:
     city, sinergym = run_peer("citylearn", folder), run_peer("sinergym", folder)
     return {
         "1": {
-            "CityLearn 3.0.2, steps of an hour, heat demand given": city["plain"]["rate"],
-            "CityLearn 3.0.2, steps of an hour, temperature by a network": city["lstm"]["rate"],
+            "CityLearn 3.0.2, steps of an hour, heat demand given": city["plain"],
+            "CityLearn 3.0.2, steps of an hour, temperature by a network": city["lstm"],
         },
         "5": {"Sinergym 3.5.1 with EnergyPlus 25.2, steps of 15 minutes": sinergym["rate"]},
     }

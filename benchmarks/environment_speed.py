@@ -9,7 +9,7 @@ process on one thread, of a peer with all its threads, best of some stretches; t
 takes to be made stands beside it.
 
 Run: ``python benchmarks/environment_speed.py --out results/environment [--peers] [--publish]``; two minutes, with peers
-five more, most of it to install them. Writes ``environment_speed.json`` and ``.md``.
+ten, most of it to install them. Writes ``environment_speed.json`` and ``.md``.
 """
 
 from __future__ import annotations
