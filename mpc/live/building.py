@@ -73,15 +73,20 @@ class BuildingController:
             forecast = Forecast(self._without(forecast.table))
         return self.controller.step(measurements, forecast)
 
-    def start_up(self, telemetry: pd.DataFrame) -> None:
+    def start_up(self, telemetry: pd.DataFrame) -> pd.DataFrame:
         """Bring the state up from the time before the first step.
 
         Parameters
         ----------
         telemetry : DataFrame
             As of `MpcController.start_up`.
+
+        Returns
+        -------
+        DataFrame, shape (n_step, n_zone)
+            Heat that the model lacked, as there [W].
         """
-        self.controller.start_up(self._without(telemetry))
+        return self.controller.start_up(self._without(telemetry))
 
     @property
     def station(self) -> str:

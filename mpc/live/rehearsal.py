@@ -3,6 +3,7 @@
 A plan says what it costs beside the rule from the same state on, over its horizon. Added up over a day that is no
 saving: a plan leaves out what the building needs once its horizon is over, and is never followed to its end. So both
 controls are run through the days in closed loop, with the weather that was measured and the forecasts that there were.
+And with the heat that the model lacked: what was measured in the zones tells it, whoever was in control then.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from mpc.adapters.described.conditions import SeriesGains
 from mpc.baselines.rules import OutdoorReset
 from mpc.errors import LiveError
 from mpc.kpi.daily import by_day
-from mpc.live.building import believed, own_rule
+from mpc.live.building import BuildingController, believed, own_rule
 from mpc.live.past import past_table, plans_on_record
 from mpc.live.planner import Planner, forecast_of_dict
 from mpc.live.site import Site
@@ -145,7 +146,8 @@ def rehearse(
     """Run optimal control and the building's own through recorded days, each in closed loop with the site's model.
 
     Both meet the weather that was measured, prices and bands that were in force, and the forecasts that there were. The
-    building is the controller's own model: what that lacks has no part in it.
+    building is the controller's own model, with the heat that its observer found to be lacking on these days, in both
+    runs and foreseen in none.
 
     Parameters
     ----------
@@ -185,7 +187,9 @@ def rehearse(
     building, system, parameters = believed(site, entry)
     step = MODEL_STEP if site.step % MODEL_STEP == 0.0 else site.step
     gains = "internal_gains" not in model_settings(parameters).effects  # which the model has itself otherwise
-    scenario = _scenario(site, building, recorded, first, taken, step, gains)
+    now, table = _as_recorded(site, building, recorded, first, taken, gains)
+    lacked = Planner(site).controller.start_up(table)
+    scenario = _scenario(site, building, now, table, lacked, step)
     plant = SimulatedPlant(
         scenario, system, ReducedBuilding(control_model(building, parameters), step_seconds=step),
         control_steps=round(site.step / step), noise=SensorNoise(), warm_up_days=_WARM_UP, seed=_SEED,
@@ -197,6 +201,8 @@ def rehearse(
     runs = []
     for number, acts in enumerate((False, True)):
         chosen = Planner(site, controller).controller if acts else None
+        if isinstance(chosen, BuildingController) and lead:
+            chosen.start_up(table.iloc[:lead])
         seen = plant.reset()  # without a seed, which would draw other people than those on record
         for k in range(-lead, steps):
             actions = own.step(seen, None)
@@ -247,21 +253,34 @@ def _recorded(folder: Path, begin: pd.Timestamp | None, end: pd.Timestamp | None
     return found
 
 
-def _scenario(
-    site: Site, building: Building, recorded: _Recorded, first: float, taken: NDArray[np.int64], step: float,
-    gains: bool,
-) -> Scenario:  # fmt: skip
-    """Lay out what drove the days, on the model's steps; what was not recorded stays as it was the step before.
+def _as_recorded(
+    site: Site, building: Building, recorded: _Recorded, first: float, taken: NDArray[np.int64], gains: bool
+) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Lay out what was forecast for the control steps and what was measured in them, by their ends.
 
-    `taken` are the control steps by their number after the first that counts, as they come one after the other.
+    `taken` are the steps by their number after the first that counts, as they come one after the other. What was not
+    forecast stays as it was the step before; nor was weather that was not measured another one; of the rest NaN is left.
     """
-    zone, zones, each = site.plant.location.timezone, building.zone_names, round(site.step / step)
-    steps, low = int(taken[-1]) + 1, int(taken.min())
-    begin = pd.Timestamp(first + (steps - taken.size) * site.step, unit="s", tz="UTC").tz_convert(zone)
-    grid = StepGrid(begin, step, taken.size * each)
+    zone, steps, low = site.plant.location.timezone, int(taken[-1]) + 1, int(taken.min())
+    end, length = first + steps * site.step, pd.Timedelta(seconds=site.step)
+    stamps = pd.date_range(end=pd.Timestamp(end, unit="s", tz=zone), periods=taken.size, freq=length)
     times = first + site.step * np.arange(low, steps)
     now = pd.DataFrame.from_dict(recorded.now, orient="index", dtype=float).reindex(times).ffill().bfill()
-    now = now.take(taken - low)
+    table = past_table(recorded.past, end + site.step, site.step, zone, building.weather_station)
+    weather = [column for column in table if str(column).partition("/")[0] == building.weather_station]
+    table[weather] = table[weather].interpolate(limit_direction="both")
+    now, table = now.take(taken - low).set_index(stamps), table.iloc[low - steps :].take(taken - low).set_index(stamps)
+    expected = [OCCUPANCY_POINT, "internal_gain"] if gains else [OCCUPANCY_POINT]
+    foreseen = [f"{name}/{point}" for point in expected for name in building.zone_names]
+    return now, table.assign(**{column: now[column] for column in foreseen if column in now})
+
+
+def _scenario(
+    site: Site, building: Building, now: pd.DataFrame, table: pd.DataFrame, lacked: pd.DataFrame, step: float
+) -> Scenario:
+    """Lay out what drove the days, on the model's steps."""
+    zones, each, station = building.zone_names, round(site.step / step), building.weather_station
+    grid = StepGrid(table.index[0] - pd.Timedelta(seconds=site.step), step, len(table) * each)
 
     def rows(*names: str) -> FloatArray:
         missing = [name for name in names if name not in now or now[name].isna().any()]
@@ -274,23 +293,18 @@ def _scenario(
     def price(of: str) -> FloatArray:
         return rows(f"{of}_price")[:, 0] if f"{of}_price" in now else np.zeros(grid.n_steps)
 
-    station = building.weather_station
-    seen = past_table(recorded.past, first + (steps + 1) * site.step, site.step, zone, station)
-    named = {f"{station}/{point}": point for point in WEATHER_POINTS if f"{station}/{point}" in seen}
-    measured = seen[list(named)].rename(columns=named).interpolate(limit_direction="both")
-    measured = measured.iloc[low - steps:].take(taken - low)
-    measured.index = begin + pd.to_timedelta(site.step * np.arange(1, taken.size + 1), unit="s")
-    weather = Weather(measured, building.location, step=site.step).on(grid)
+    named = {f"{station}/{point}": point for point in WEATHER_POINTS if f"{station}/{point}" in table}
+    weather = Weather(table[list(named)].rename(columns=named), building.location, step=site.step).on(grid)
     nothing, carbon = np.zeros((grid.n_steps, len(zones))), np.zeros(grid.n_steps)
-    given = gains and f"{zones[0]}/internal_gain" in now
-    heat = SeriesGains(sensible=0.0, latent=0.0, others=of_zones("internal_gain") if given else nothing)
+    heat = of_zones("internal_gain") if f"{zones[0]}/internal_gain" in table else nothing
     people = of_zones(OCCUPANCY_POINT) if f"{zones[0]}/{OCCUPANCY_POINT}" in now else nothing
     return Scenario(
         building, grid, zone_areas(building), np.zeros(len(zones)), weather, occupancy=people,
         expected_occupancy=people, lower=of_zones("comfort_lower_temperature"),
         upper=of_zones("comfort_upper_temperature"), electricity_price=price("electricity"), gas_price=price("gas"),
         electricity_carbon=carbon, gas_carbon=carbon, demand=(), currency=_currency(site), carbon_kind="",
-        people=ScheduledOccupancy(dict.fromkeys(zones, 0.0)), heat=heat,
+        people=ScheduledOccupancy(dict.fromkeys(zones, 0.0)), heat=SeriesGains(sensible=0.0, latent=0.0, others=heat),
+        unmeasured=np.repeat(lacked[list(zones)].to_numpy(), each, axis=0),
     )  # fmt: skip
 
 

@@ -58,8 +58,8 @@ class Scenario:
         Where the people come from.
     heat : InternalGains
         What they and their equipment give off.
-    unmeasured : DisturbanceModel, optional
-        Heat in the zones that nobody measures or foresees; none by default.
+    unmeasured : DisturbanceModel or ndarray, shape (n_steps, n_zone), optional
+        Heat in the zones that nobody measures or foresees, drawn or as it was [W]; none by default.
     seed : int
         Of that heat.
     """
@@ -82,7 +82,7 @@ class Scenario:
     carbon_kind: str
     people: Occupancy
     heat: InternalGains
-    unmeasured: DisturbanceModel | None = None
+    unmeasured: DisturbanceModel | FloatArray | None = None
     seed: int = 0
 
     def redrawn(self, seed: int) -> Scenario:
@@ -101,6 +101,8 @@ class Scenario:
         heat = self.heat.heat(self.occupancy, self.assigned, self.areas)
         if self.unmeasured is None:
             return heat
+        if not isinstance(self.unmeasured, DisturbanceModel):
+            return np.asarray(heat + self.unmeasured)
         rng = np.random.default_rng((self.seed, len("unmeasured")))  # another stream than that of the people
         n_steps, n_zone = heat.shape
         return np.asarray(heat + self.unmeasured.drawn(self.grid.step, n_steps, n_zone, rng))

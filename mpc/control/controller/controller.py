@@ -125,7 +125,7 @@ class MpcController:
         named = self.points.setpoints(self._channels, self._known.previous, self.problem.predictor.hvac)
         return Action(named, source, tuple(reasons), solution, stamp)
 
-    def start_up(self, telemetry: pd.DataFrame) -> None:
+    def start_up(self, telemetry: pd.DataFrame) -> pd.DataFrame:
         """Bring the state up from telemetry of the time before the first step; nothing is decided.
 
         Walls and slabs remember a day or two; without this they begin at rest with the zones as they are. Energy that
@@ -138,6 +138,11 @@ class MpcController:
             as `thermal.case.telemetry.Telemetry` has them; ``ZONE/internal_gain`` [W] is expected heat of people,
             lights and
             equipment, none where absent. NaN is missing.
+
+        Returns
+        -------
+        DataFrame, shape (n_step, n_zone)
+            Heat in the zones that the model lacked, by the end of the control step as far as it was known then [W].
 
         Raises
         ------
@@ -153,7 +158,7 @@ class MpcController:
         if self.signals is not None:
             stamps = pd.DatetimeIndex([stamp for stamp, *_ in steps])
             others = self.signals(self.points.past_forecast(telemetry), stamps)
-        started = False
+        started, lacked = False, []
         for (stamp, measured, outdoor, gains), other in zip(steps, others, strict=True):
             read = self.points.read(measured, self._system)
             boundary, seen = np.concatenate([[outdoor], other]), np.isfinite(read.zone)
@@ -164,8 +169,10 @@ class MpcController:
                 self.observer.start(np.where(seen, read.zone, read.zone[seen].mean()), boundary)
                 started = True
             self._count(read, stamp)
+            lacked.append(self.observer.disturbance.copy())
         ControlError.unless(started, "start-up: telemetry", "a zone that reports", "none that does")
         self._known.started, self._known.gains = True, steps[-1][3]
+        return pd.DataFrame(lacked, index=[stamp for stamp, *_ in steps], columns=list(self.points.zones))
 
     def _now(
         self, measurements: Measured, forecast: Forecast | None, now: pd.Timestamp | None, reasons: list[str]
