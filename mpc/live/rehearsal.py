@@ -25,9 +25,9 @@ from mpc.adapters.described.conditions import SeriesGains
 from mpc.baselines.rules import OutdoorReset
 from mpc.errors import LiveError
 from mpc.kpi.daily import by_day
-from mpc.live.building import BuildingController, believed, own_rule
+from mpc.live.building import BuildingController, believed, building_controller, own_rule
 from mpc.live.past import past_table, plans_on_record
-from mpc.live.planner import Planner, forecast_of_dict
+from mpc.live.planner import Planner, forecast_of_dict, site_actuators
 from mpc.live.site import Site
 from mpc.live.site_file import BuildingModel
 from mpc.loop.noise import SensorNoise
@@ -45,9 +45,9 @@ from thermal._types import FloatArray
 from thermal.case.building import Building
 from thermal.case.points import OUTDOOR_TEMPERATURE
 
-#: Days that the first one is run through beforehand, and then those recorded before it, or of a week the week itself
-#: [d], all under the building's own control: walls forget how they began, and a Monday makes up for a weekend.
-_WARM_UP, _WEEK = 3, 7
+#: Days that come before the first, all under the building's own control, as walls forget how they began and a Monday
+#: makes up for a weekend: those recorded before it, or of a week [d] the week itself, and how often the first of them.
+_WEEK, _FIRST_DAY = 7, 3
 
 #: Least share of a day's steps that must be on record for it to count [-]; what is missing stays as it was before.
 _ON_RECORD = 0.9
@@ -178,21 +178,22 @@ def rehearse(
     whole = _whole_days(times, site)
     expected, found = "a day of the controller's plans with their forecasts", f"{len(times) or 'no'} steps"
     LiveError.unless(whole.size, f"{site.folder}", expected, f"{found}{recorded.reach(site)}", "let it run in shadow")
-    first, week = times[0], round(_WEEK * DAY / site.step)
+    first, day, week = times[0], round(DAY / site.step), round(_WEEK * DAY / site.step)
     steps = round((times[-1] - first) / site.step) + 1
-    lead = round((first - before[0]) / site.step) if before else 0
-    taken = np.arange(-lead, steps)
-    if lead < week <= steps:
-        lead, taken = week, np.r_[0:week, 0:steps]
+    taken = np.arange(round((before[0] - first) / site.step) if before else 0, steps)
+    if taken.size < week + steps and week <= steps:
+        taken = np.r_[0:week, 0:steps]
+    taken = np.r_[np.tile(taken[:day], _FIRST_DAY), taken]
+    lead = taken.size - steps
     building, system, parameters = believed(site, entry)
     step = MODEL_STEP if site.step % MODEL_STEP == 0.0 else site.step
     gains = "internal_gains" not in model_settings(parameters).effects  # which the model has itself otherwise
     now, table = _as_recorded(site, building, recorded, first, taken, gains)
-    lacked = Planner(site).controller.start_up(table)
-    scenario = _scenario(site, building, now, table, lacked, step)
+    observed = building_controller(site, entry, site_actuators(site))
+    scenario = _scenario(site, building, now, table, observed.start_up(table), step)
     plant = SimulatedPlant(
         scenario, system, ReducedBuilding(control_model(building, parameters), step_seconds=step),
-        control_steps=round(site.step / step), noise=SensorNoise(), warm_up_days=_WARM_UP, seed=_SEED,
+        control_steps=round(site.step / step), noise=SensorNoise(), warm_up_days=0, seed=_SEED,
     )  # fmt: skip
     own = OutdoorReset([a for a in plant.actuators if a.required], building.weather_station, own_rule(entry))
     usual = {f"{building.weather_station}/{OUTDOOR_TEMPERATURE}": float(scenario.outdoor.mean())}
@@ -201,7 +202,7 @@ def rehearse(
     runs = []
     for number, acts in enumerate((False, True)):
         chosen = Planner(site, controller).controller if acts else None
-        if isinstance(chosen, BuildingController) and lead:
+        if isinstance(chosen, BuildingController):
             chosen.start_up(table.iloc[:lead])
         seen = plant.reset()  # without a seed, which would draw other people than those on record
         for k in range(-lead, steps):
@@ -259,7 +260,7 @@ def _as_recorded(
     """Lay out what was forecast for the control steps and what was measured in them, by their ends.
 
     `taken` are the steps by their number after the first that counts, as they come one after the other. What was not
-    forecast stays as it was the step before; nor was weather that was not measured another one; of the rest NaN is left.
+    forecast stays as it was the step before, weather that was not measured lies between; of the rest NaN is left.
     """
     zone, steps, low = site.plant.location.timezone, int(taken[-1]) + 1, int(taken.min())
     end, length = first + steps * site.step, pd.Timedelta(seconds=site.step)
@@ -267,8 +268,8 @@ def _as_recorded(
     times = first + site.step * np.arange(low, steps)
     now = pd.DataFrame.from_dict(recorded.now, orient="index", dtype=float).reindex(times).ffill().bfill()
     table = past_table(recorded.past, end + site.step, site.step, zone, building.weather_station)
-    weather = [column for column in table if str(column).partition("/")[0] == building.weather_station]
-    table[weather] = table[weather].interpolate(limit_direction="both")
+    weather = table.columns.str.startswith(f"{building.weather_station}/")
+    table.loc[:, weather] = table.loc[:, weather].interpolate(limit_direction="both")
     now, table = now.take(taken - low).set_index(stamps), table.iloc[low - steps :].take(taken - low).set_index(stamps)
     expected = [OCCUPANCY_POINT, "internal_gain"] if gains else [OCCUPANCY_POINT]
     foreseen = [f"{name}/{point}" for point in expected for name in building.zone_names]

@@ -37,7 +37,7 @@ def record(site: Site, plant: Any, days: int = 1) -> None:
 
 
 def test_a_recorded_day_is_run_through_anew(office_site: Callable[[float], Any], tmp_path: Path) -> None:
-    """The own control costs by the model about what it did in the building."""
+    """The own control costs by the model what it did in the building, as the heat that the model lacks is found."""
     device, plant, path = office_site(1.0)
     device.stop()
     site, out = Site(path), tmp_path / "rehearsed"
@@ -47,8 +47,8 @@ def test_a_recorded_day_is_run_through_anew(office_site: Callable[[float], Any],
     told, done = json.loads(made.stdout), plant.bought().iloc[0]
     (day,) = told["days"]
     assert (told["steps"], told["lost"], told["promised"], day["day"]) == (96, 0, 0.25, "2023-01-09")
-    assert day["own_cost"] == pytest.approx(done["cost"], rel=0.3)
-    assert day["own_energy"] == pytest.approx(done["energy"], rel=0.3)
+    assert day["own_cost"] == pytest.approx(done["cost"], rel=0.05)
+    assert day["own_energy"] == pytest.approx(done["energy"], rel=0.05)
     assert 0.0 < told["saving"] == pytest.approx(1.0 - day["cost"] / day["own_cost"])
     assert "On this day acting would have saved" in (out / "report.html").read_text(encoding="utf-8")
     assert pd.read_parquet(out / "days.parquet")["cost"].iloc[0] == day["cost"]
@@ -75,12 +75,14 @@ def own_cost(site: Site, gain: float) -> float:
 
 
 @pytest.mark.long
-def test_people_of_the_recorded_day_drive_the_effects_of_the_model(office_site: Callable[[float], Any]) -> None:
+def test_own_control_costs_what_it_did_whatever_the_model_takes_people_for(office_site: Callable[[float], Any]) -> None:
+    """Heat that the model has is not found to be lacking as well, and heat that it has too much of is taken away."""
     device, plant, path = office_site(1.0)
     device.stop()
     site = Site(path)
     record(site, plant)
-    assert own_cost(site, 25.0) < 0.8 * own_cost(site, 0.0)
+    for gain in (0.0, 25.0):
+        assert own_cost(site, gain) == pytest.approx(plant.bought()["cost"].iloc[0], rel=0.05)
 
 
 @pytest.mark.long
@@ -94,7 +96,7 @@ def test_a_monday_makes_up_for_the_weekend(office_site: Callable[[float], Any]) 
     told: list[tuple[int, int]] = []
     week = rehearse(site, controller=idle, progress=lambda _, done, total: told.append((done, total)))
     assert (len(week.days), week.steps, week.days.index[0]) == (7, 7 * 96, monday)
-    assert told == [(k + 1, 4 * 7 * 96) for k in range(4 * 7 * 96)]
+    assert told == [(k + 1, 2 * 17 * 96) for k in range(2 * 17 * 96)]  # two weeks, and a Monday thrice
     days = rehearse(site, monday + pd.Timedelta(hours=14), monday + pd.Timedelta(days=2.5), controller=idle)
     assert (list(days.days.index), days.steps, days.lost) == ([monday + pd.Timedelta(days=1)], 96, 0)  # the whole one
     alone = rehearse(site, end=monday + pd.Timedelta(days=1), controller=idle)
@@ -102,5 +104,8 @@ def test_a_monday_makes_up_for_the_weekend(office_site: Callable[[float], Any]) 
     friday = rehearse(site, monday + pd.Timedelta(days=4), monday + pd.Timedelta(days=5), controller=idle)
     assert (friday.steps, friday.lost) == (96, 0)  # four days, which were recorded before, are behind it
     assert friday.days["own_energy"].iloc[0] == pytest.approx(week.days["own_energy"].iloc[4], rel=0.05)
+    paid = plant.bought()["energy"]  # of a Monday that had Mondays before it, as a plant of ours begins
+    np.testing.assert_allclose(week.days["own_energy"].iloc[1:], paid.iloc[1:], rtol=0.03, atol=1.0)
+    assert alone.days["own_energy"].iloc[0] == pytest.approx(paid.iloc[0], rel=0.03)
     assert week.days["own_energy"].iloc[0] > 1.05 * alone.days["own_energy"].iloc[0]
     np.testing.assert_allclose(week.days["energy"], week.days["own_energy"], rtol=1e-9)
