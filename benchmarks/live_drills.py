@@ -45,10 +45,10 @@ from _drill_process import DrillController
 from _drill_stack import HIGH, LOW, RATE, RATES, STEP, TICK, Stack
 from _table import markdown, write
 
-from mpc.live.audit import read_log
+from mpc.live.audit import log_files, read_log
 from mpc.live.historian.store import Historian
 from mpc.live.planner import Planner
-from mpc.live.replay import replay_log
+from mpc.live.replay import replay_logs
 from mpc.live.site import Site
 
 #: Control steps within which a healed site must act again, a part that starts among them; else it counts as not back.
@@ -164,13 +164,12 @@ def _kept(stack: Stack, found: Drill, fault: Fault, begin: float) -> None:
 
 def check_logs(stack: Stack) -> tuple[int, int, list[str]]:
     """Repeat all logs of guard and controller; lines, decisions, and what does not repeat."""
-    lines, decisions, wrong, before = 0, 0, list[str](), None
-    for path in sorted(stack.site.folder.glob("guard-[0-9]*.jsonl")):
-        one = replay_log(path, before=before)
-        lines, decisions, before = lines + one.lines, decisions + one.decisions, one.last or before
+    lines, decisions, wrong = 0, 0, list[str]()
+    for path, one in replay_logs(log_files(stack.site.folder, "guard")).items():
+        lines, decisions = lines + one.lines, decisions + one.decisions
         wrong += [f"{path.name}: {text}" for text in [one.broken, *one.different] if text]
     planner, before = Planner(Site(stack.site_path), DrillController()), None
-    for path in sorted(stack.site.folder.glob("controller-[0-9]*.jsonl")):
+    for path in log_files(stack.site.folder, "controller"):
         for at, entry in read_log(path, before):
             lines, before = lines + 1, entry["hash"]
             if entry["kind"] != "plan":

@@ -31,10 +31,10 @@ from _postgres import PostgresServer
 from _table import markdown, write
 from newcomer_live import free_port
 
-from mpc.live.audit import read_log
+from mpc.live.audit import log_files, read_log
 from mpc.live.page.metrics import process_use
 from mpc.live.rehearsal import rehearse
-from mpc.live.replay import replay_log
+from mpc.live.replay import replay_logs
 from mpc.live.site import Site
 from mpc.loop.make import save_pilot
 from thermal.pilot.building import pilot_building
@@ -148,9 +148,9 @@ class Week:
         while not self.plant.finished:
             self.plant.step({})
         own = self.plant.bought()
-        plans = [entry["content"] for file in sorted(logs.glob("controller-*.jsonl"))
+        plans = [entry["content"] for file in log_files(logs, "controller")
                  for _, entry in read_log(file, None) if entry["kind"] == "plan"]  # fmt: skip
-        replays = [replay_log(file, path) for file in sorted(logs.glob("*.jsonl"))]
+        replays = list(replay_logs(log_files(logs), path).values())
         seconds, site = sum(self.days) * 86400.0, Site(path)
         begin = pd.Timestamp(self.site.first, unit="s", tz="UTC")
         acting = begin + pd.Timedelta(days=sum(self.days[:2]))
@@ -184,14 +184,14 @@ def _counted(words: Any) -> dict[str, int]:
 def _doubts(logs: Path) -> dict[str, int]:
     """Doubts of the guard by their first words, in ticks."""
     return _counted(
-        " ".join(doubt.split()[:4]) for file in sorted(logs.glob("guard-*.jsonl")) for _, entry in read_log(file, None)
+        " ".join(doubt.split()[:4]) for file in log_files(logs, "guard") for _, entry in read_log(file, None)
         if entry["kind"] == "tick" for doubt in entry["content"]["decision"]["doubts"]
     )  # fmt: skip
 
 
 def _samples(logs: Path) -> dict[str, float]:
     """Count the samples that the collector has read and stored, and the median time between two readings [s]."""
-    reads = [entry["content"] for file in sorted(logs.glob("collector-*.jsonl"))
+    reads = [entry["content"] for file in log_files(logs, "collector")
              for _, entry in read_log(file, None) if entry["kind"] == "read"]  # fmt: skip
     return {
         "samples": sum(read["samples"] for read in reads), "readings": len(reads),

@@ -235,16 +235,13 @@ def replay(
 
     Example: buildingmpc replay live/guard-000000.jsonl
     """
-    from mpc.live.replay import replay_log
+    from mpc.live.audit import log_files
+    from mpc.live.replay import replay_logs
 
-    files = sorted(log.glob("*-[0-9]*.jsonl")) if log.is_dir() else [log]
+    files = log_files(log) if log.is_dir() else [log]
     LiveError.unless(files, str(log), "files of an audit log", "none")
-    found, before, rows = dict[str, dict[str, Any]](), dict[str, str](), []
-    for path in files:
-        name = path.stem.rpartition("-")[0]
-        one = replay_log(path, site, before.get(name))
-        if one.last:
-            before[name] = one.last
+    found, rows = dict[str, dict[str, Any]](), []
+    for path, one in replay_logs(files, site).items():
         found[path.name] = {"lines": one.lines, "decisions": one.decisions, "broken": one.broken,
                             "different": one.different, "notes": one.notes, "last": one.last}  # fmt: skip
         rows.append((path.name, one.lines, one.decisions, one.broken or "; ".join(one.different[:3]) or "repeats"))

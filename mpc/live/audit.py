@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
+import contextlib
+import gzip
 import hashlib
 import json
 import os
-from collections.abc import Iterator, Mapping
+import shutil
+import zlib
+from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 from mpc.errors import LiveError
 
 #: Before the first line of the first file.
 NOTHING = "0" * 64
+
+#: Length of a file from which on a further one is begun [bytes]: half a day of the pilot's plans.
+LARGEST = 32_000_000
+
+_PLAIN, _HALF = ".jsonl", ".part"
 
 
 def canonical(content: Any) -> str:
@@ -41,7 +51,8 @@ class AuditLog:
     """A file that lines are only ever added to; a line is on disk when `append` returns.
 
     A process begins a file of its own, whose first line goes on with the hash of the last file of its name, so that
-    a whole file that is missing in between is seen.
+    a whole file that is missing in between is seen. Once it is full, a further one goes on from it the same way, with
+    a first line of kind ``turned``, and the full one is compressed.
 
     Parameters
     ----------
@@ -49,8 +60,8 @@ class AuditLog:
         Where the files are.
     name : str
         Of the process, such as ``guard``.
-    wall : float
-        Wall clock, since 1970 in UTC [s], for the file's name.
+    again : callable, optional
+        Gives what a further file must say first, so that it can be read without those before it; nothing by default.
 
     Raises
     ------
@@ -58,13 +69,14 @@ class AuditLog:
         From `append`, when the disk does not take the line.
     """
 
-    def __init__(self, folder: Path, name: str, wall: float) -> None:
+    def __init__(self, folder: Path, name: str, again: Callable[[], Mapping[str, Any]] = dict) -> None:
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-        earlier = log_files(folder, name)
+        earlier, self._again, self._length = log_files(folder, name), again, 0
         self._before, self._number = _end(earlier[-1]) if earlier else (NOTHING, -1)
-        count = int(earlier[-1].stem.rpartition("-")[2]) + 1 if earlier else 0
-        self.path = folder / f"{name}-{count:06d}.jsonl"
-        self._file = os.open(self.path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_EXCL, 0o600)
+        self._name, self._count = name, _place(earlier[-1])[1] + 1 if earlier else 0
+        for half in folder.glob(f"{name}-*{_HALF}"):
+            half.unlink()
+        self.path, self._file = self._begun(folder)
 
     @property
     def last(self) -> str:
@@ -81,6 +93,12 @@ class AuditLog:
         content : mapping
             Plain types, finite numbers.
         """
+        digest = self._add(kind, content)
+        if self._length >= LARGEST:
+            self._turn()
+        return digest
+
+    def _add(self, kind: str, content: Mapping[str, Any]) -> str:
         entry = {"n": self._number + 1, "before": self._before, "kind": kind, "content": content}
         digest = hashlib.sha256(canonical(entry).encode()).hexdigest()
         line = (canonical(entry | {"hash": digest}) + "\n").encode()
@@ -90,37 +108,96 @@ class AuditLog:
             os.fsync(self._file)
         except OSError as error:
             raise LiveError("audit log", "a disk that can be written to", str(error)) from error
-        self._number, self._before = self._number + 1, digest
+        self._number, self._before, self._length = self._number + 1, digest, self._length + len(line)
         return digest
+
+    def _begun(self, folder: Path) -> tuple[Path, int]:
+        path = folder / f"{self._name}-{self._count:06d}{_PLAIN}"
+        try:
+            return path, os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_EXCL, 0o600)
+        except OSError as error:
+            raise LiveError("audit log", "a folder that can be written to", str(error)) from error
+
+    def _turn(self) -> None:
+        """Go on in a further file; the full one is compressed beside."""
+        full, self._count, self._length = self.path, self._count + 1, 0
+        os.close(self._file)
+        self.path, self._file = self._begun(full.parent)
+        self._add("turned", self._again())
+        Thread(target=_compress, args=(full,), daemon=True).start()
 
     def close(self) -> None:
         """End the file."""
         os.close(self._file)
 
 
-def log_files(folder: Path, name: str) -> list[Path]:
-    """List the files of a process' log, oldest first.
+def log_files(folder: Path, name: str = "*") -> list[Path]:
+    """List the files of a process' log, oldest first, or of all logs by process.
 
     Parameters
     ----------
     folder : Path
         Of the logs.
     name : str
-        Of the process.
+        Of the process; all by default.
     """
-    return sorted(folder.glob(f"{name}-[0-9]*.jsonl"))
+    found = {_place(path): path for path in sorted(folder.glob(f"{name}-[0-9]*{_PLAIN}.gz"))}
+    found |= {_place(path): path for path in folder.glob(f"{name}-[0-9]*{_PLAIN}")}  # one that is being compressed
+    return [found[place] for place in sorted(found)]
+
+
+def log_lines(path: Path) -> list[bytes]:
+    """Read the lines of a file of a log, compressed or not, with their ends.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Raises
+    ------
+    LiveError
+        When it cannot be unpacked.
+    """
+    content = path.read_bytes()
+    if path.suffix == ".gz":
+        try:
+            content = gzip.decompress(content)
+        except (OSError, EOFError, zlib.error) as error:
+            raise LiveError(path.name, "a whole compressed file", str(error)) from error
+    return content.splitlines(keepends=True)
+
+
+def _place(path: Path) -> tuple[str, int]:
+    """Name of a file's process, and its number."""
+    name, _, number = path.name.partition(".")[0].rpartition("-")
+    return name, int(number)
+
+
+def _compress(full: Path) -> None:
+    """Put a compressed file in the place of a full one; where that fails it stays as it is."""
+    half = full.with_name(full.name + _HALF)
+    with contextlib.suppress(OSError):
+        with full.open("rb") as source, half.open("wb") as file:
+            os.chmod(half, 0o600)
+            with gzip.GzipFile(full.name, "wb", 6, file, 0) as target:
+                shutil.copyfileobj(source, target)
+            file.flush()
+            os.fsync(file.fileno())
+        half.replace(full.with_name(full.name + ".gz"))
+        full.unlink()
 
 
 def _end(path: Path) -> tuple[str, int]:
     """Hash and number of the last whole line of a file; those of the files before where it has none."""
-    for line in reversed(path.read_bytes().splitlines(keepends=True)):
+    for line in reversed(log_lines(path)):
         if line.endswith(b"\n"):
             try:
                 entry = json.loads(line)
                 return str(entry["hash"]), int(entry["n"])
             except (ValueError, KeyError, TypeError):
                 continue
-    others = log_files(path.parent, path.stem.rpartition("-")[0])
+    others = log_files(path.parent, _place(path)[0])
     at = others.index(path)
     return _end(others[at - 1]) if at else (NOTHING, -1)
 
@@ -147,7 +224,7 @@ def read_log(path: Path, before: str | None = None) -> Iterator[tuple[int, dict[
         crash leaves, is left out: it was never acknowledged.
     """
     number: int | None = None
-    for at, line in enumerate(path.read_bytes().splitlines(keepends=True), 1):
+    for at, line in enumerate(log_lines(path), 1):
         where = f"{path.name}: line {at}"
         if not line.endswith(b"\n"):
             return

@@ -49,7 +49,7 @@ class Collector:
             Historian(database.address, database.schema_name), Spool(site.folder / "spool", database.spool * 10**6),
             units, retry=self.clock.real(10.0),
         )  # fmt: skip
-        self.log = AuditLog(site.folder, "collector", self.clock.wall())
+        self.log = AuditLog(site.folder, "collector")
         self.log.append("start", {"code": code_version(), "configuration": site.hash, "wall": self.clock.wall()})
         self._pace = Pace(self.clock)
         self._trimmed = -math.inf

@@ -55,11 +55,10 @@ class ControlProcess:
         self.columns = needed_columns(site, self.planner.controller)
         self._still: dict[str, tuple[float, float]] = {}
         self.zones = [f"{zone}/{ZONE_TEMPERATURE}" for zone in site.plant.zones]
-        self.log = AuditLog(site.folder, "controller", self.clock.wall())
-        self.log.append(
-            "start", {"code": code_version(), "configuration": site.hash, "site": site.path.name,
-                      "controller": site.file.controller, "wall": self.clock.wall()},
-        )  # fmt: skip
+        begin = {"code": code_version(), "configuration": site.hash, "site": site.path.name,
+                 "controller": site.file.controller, "wall": self.clock.wall()}  # fmt: skip
+        self.log = AuditLog(site.folder, "controller", lambda: begin)
+        self.log.append("start", begin)
         self._day = DayCost(site, read_state(site.folder / "controller.json").get("day"))
         self._stop = threading.Event()
 

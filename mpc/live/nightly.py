@@ -167,7 +167,7 @@ def run_nightly(site: Site, clock: Clock | None = None) -> int:
     if not asyncio.run(waited()):
         return 0
     before, now = read_state(nightly.state_path), clock.wall()
-    log = AuditLog(site.folder, "nightly", now)
+    log = AuditLog(site.folder, "nightly")
     log.append("start", {"code": code_version(), "configuration": site.hash, "wall": now})
     state = nightly.evaluate(now)
     log.append("night", {key: value for key, value in state.items() if key != "weekly"})

@@ -10,7 +10,8 @@ from typing import Any
 
 import pandas as pd
 
-from mpc.live.audit import log_files
+from mpc.errors import LiveError
+from mpc.live.audit import log_files, log_lines
 
 #: How far back is looked [s]: walls and slabs remember a day or two.
 SPAN = 2 * 86400.0
@@ -19,7 +20,7 @@ SPAN = 2 * 86400.0
 def plans_on_record(
     folder: Path, *, newest_first: bool = False
 ) -> Iterator[tuple[float, dict[str, Any], dict[str, Any], dict[str, float | None]]]:
-    """Read the plans in the controller's logs; a line that cannot be read is left out: the log is not judged here.
+    """Read the plans in the controller's logs; what cannot be read is left out: the log is not judged here.
 
     Parameters
     ----------
@@ -36,7 +37,10 @@ def plans_on_record(
     """
     files = log_files(folder, "controller")
     for path in reversed(files) if newest_first else files:
-        lines = path.read_bytes().splitlines()
+        try:
+            lines = log_lines(path)
+        except LiveError:
+            continue
         for line in reversed(lines) if newest_first else lines:
             if b'"kind":"plan"' not in line:
                 continue

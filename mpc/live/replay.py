@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from mpc.errors import LiveError
 from mpc.live.audit import canonical, code_version, read_log
-from mpc.live.guard.decide import Guard
+from mpc.live.guard.decide import Guard, GuardState
 from mpc.live.guard.rules import GuardRules
 from mpc.live.planner import Planner
 from mpc.live.site import Site
@@ -30,6 +31,9 @@ class Replay:
         What was not repeated, and why.
     last : str
         Hash of the last event.
+    guard : Guard or None
+    planner : Planner or None
+        As they stand at the end, for a file that goes on from this one.
     """
 
     lines: int = 0
@@ -38,6 +42,8 @@ class Replay:
     different: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     last: str = ""
+    guard: Guard | None = field(default=None, repr=False)
+    planner: Planner | None = field(default=None, repr=False)
 
     @property
     def fine(self) -> bool:
@@ -45,7 +51,26 @@ class Replay:
         return not self.broken and not self.different
 
 
-def replay_log(path: Path, site: Path | None = None, before: str | None = None) -> Replay:
+def replay_logs(paths: Iterable[Path], site: Path | None = None) -> dict[Path, Replay]:
+    """Repeat files of audit logs, each of which goes on from the one before of its process.
+
+    Parameters
+    ----------
+    paths : iterable of Path
+        In the order of `mpc.live.audit.log_files`.
+    site : Path, optional
+        As of `replay_log`.
+    """
+    found, last = dict[Path, Replay](), dict[str, Replay]()
+    for path in paths:
+        process = path.name.rpartition("-")[0]
+        found[path] = replay_log(path, site, last.get(process))
+        if found[path].last:
+            last[process] = found[path]
+    return found
+
+
+def replay_log(path: Path, site: Path | None = None, earlier: Replay | None = None) -> Replay:
     """Repeat a file of an audit log.
 
     Parameters
@@ -54,8 +79,8 @@ def replay_log(path: Path, site: Path | None = None, before: str | None = None) 
         Of the guard, the controller or the collector.
     site : Path, optional
         The ``site.yaml`` of that time, which plans are repeated with; the decisions of the guard need none.
-    before : str, optional
-        Hash that the file must go on from.
+    earlier : Replay, optional
+        Of the file before, which this one must go on from.
 
     Raises
     ------
@@ -63,8 +88,8 @@ def replay_log(path: Path, site: Path | None = None, before: str | None = None) 
         When the file cannot be read, or the site is another one.
     """
     LiveError.unless(path.is_file(), str(path), "a file of an audit log", "no such file")
-    found, guard, planner = Replay(), None, None
-    events = read_log(path, before)
+    found, passed = Replay(), earlier or Replay()
+    events = read_log(path, passed.last or None)
     while True:
         try:
             at, entry = next(events)
@@ -78,17 +103,34 @@ def replay_log(path: Path, site: Path | None = None, before: str | None = None) 
         if kind == "start":
             _note_code(found, content)
             if "rules" in content:
-                guard = Guard(GuardRules.from_dict(content["rules"]), content["modes"], content["held_before"])
+                rules = GuardRules.from_dict(content["rules"])
+                found.guard = Guard(rules, content["modes"], content["held_before"])
             elif "controller" in content:
-                planner = _planner(site, content, found)
-        elif kind == "tick" and guard is not None:
-            _compare(found, path, at, guard.decide(content["tick"]), content["decision"])
-        elif kind == "start_up" and planner is not None:
-            planner.start_up(content["past"], content["begin"])
-        elif kind == "plan" and planner is not None:
-            again = planner.plan(content["inputs"])
+                found.planner = _planner(site, content, found)
+        elif kind == "turned":
+            _note_code(found, content)
+            _go_on(found, passed, path, at, content)
+        elif kind == "tick" and found.guard is not None:
+            _compare(found, path, at, found.guard.decide(content["tick"]), content["decision"])
+        elif kind == "start_up" and found.planner is not None:
+            found.planner.start_up(content["past"], content["begin"])
+        elif kind == "plan" and found.planner is not None:
+            again = found.planner.plan(content["inputs"])
             _compare(found, path, at, again, {key: content["plan"].get(key) for key in again})
-    return found
+
+
+def _go_on(found: Replay, passed: Replay, path: Path, at: int, content: dict[str, Any]) -> None:
+    """Take over what the file before ended with; a guard tells its state anew."""
+    if "state" in content:
+        known = content["state"] if passed.guard is None else passed.guard.state.to_dict()
+        if canonical(known) != canonical(content["state"]):
+            found.different.append(f"{path.name}: line {at}: another state than that at the end of the file before")
+        found.guard = Guard(GuardRules.from_dict(content["rules"]))
+        found.guard.state = GuardState.from_dict(content["state"])
+    elif "controller" in content:
+        found.planner = passed.planner
+        if passed.planner is None:
+            found.notes.append(f"plans of {path.name} are repeated together with the files before it only")
 
 
 def _note_code(found: Replay, content: dict[str, Any]) -> None:

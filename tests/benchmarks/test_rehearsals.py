@@ -26,7 +26,7 @@ from thermal.case.load import load_building
 
 def record(site: Site, plant: Any, days: int = 1) -> None:
     """Log plans of days under the building's own control, with what they rest on."""
-    log, each = AuditLog(site.folder, "controller", 0.0), round(site.step / plant.control_step)
+    log, each = AuditLog(site.folder, "controller"), round(site.step / plant.control_step)
     seen, columns = [plant.reset()], plant.columns
     for _ in range(96 * days):
         means = dict(zip(columns, np.mean([s.values_array for s in seen], axis=0).tolist(), strict=True))

@@ -105,6 +105,21 @@ class GuardState:
     still: dict[str, tuple[float, float]] = field(default_factory=dict)
     nonces: set[str] = field(default_factory=set)
 
+    def to_dict(self) -> dict[str, Any]:
+        """Give plain types, for the log."""
+        return vars(self) | {"nonces": sorted(self.nonces)}
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> GuardState:
+        """Make of what `to_dict` gave.
+
+        Parameters
+        ----------
+        content : mapping
+            Plain types.
+        """
+        return cls(**{**content, "nonces": set(content["nonces"])})
+
 
 class Guard:
     """Decides tick by tick.

@@ -13,7 +13,7 @@ from threading import Thread
 from typing import Any
 
 from mpc.errors import LiveError
-from mpc.live.audit import AuditLog, code_version, log_files
+from mpc.live.audit import AuditLog, code_version, log_files, log_lines
 from mpc.live.clock import Clock
 from mpc.live.guard.decide import Guard
 from mpc.live.guard.rules import rules_of
@@ -62,12 +62,8 @@ class GuardProcess:
         self._links: dict[str, Link] = make_links(site)
         modes, held = left_before(site)
         self.guard = Guard(self.rules, modes, held)
-        self.log = AuditLog(site.folder, "guard", self.clock.wall())
-        self.log.append(
-            "start",
-            {"code": code_version(), "rules": self.rules.to_dict(), "modes": modes, "held_before": held,
-             "wall": self.clock.wall(), "mono": self.clock.mono()},
-        )  # fmt: skip
+        self.log = AuditLog(site.folder, "guard", self._turned)
+        self.log.append("start", self._begin(modes, held))
         self.mailbox = Mailbox(operator_key(site.folder), self.clock.mono)
         self._results: dict[str, str] = {}
         self._ordered: float | None = None
@@ -75,6 +71,16 @@ class GuardProcess:
         self._notifier = Notifier(site.file.notify, site.file.name)
         self._status: dict[str, Any] = {}
         self._answers: dict[str, str] = {}
+
+    def _begin(self, modes: Mapping[str, str], held: Mapping[str, float]) -> dict[str, Any]:
+        """Give what a file of the log says first: what the decisions after it follow from."""
+        return {"code": code_version(), "rules": self.rules.to_dict(), "modes": dict(modes), "held_before": dict(held),
+                "wall": self.clock.wall(), "mono": self.clock.mono()}  # fmt: skip
+
+    def _turned(self) -> dict[str, Any]:
+        state = self.guard.state
+        ordered = {name: value for name, value in state.orders.items() if value is not None}
+        return self._begin(state.modes, state.held | ordered) | {"state": state.to_dict()}
 
     async def run(self) -> int:
         """Guard until it is ended; return the exit code."""
@@ -197,11 +203,13 @@ def left_before(site: Site) -> tuple[dict[str, str], dict[str, float]]:
         As read.
     """
     for path in reversed(log_files(site.folder, "guard")):
-        start, last = None, None
-        for line in path.read_bytes().splitlines():
+        start, last, lines = None, None, list[bytes]()
+        with contextlib.suppress(LiveError):  # a damaged one tells nothing
+            lines = log_lines(path)
+        for line in lines:
             with contextlib.suppress(ValueError, TypeError, KeyError):
                 entry = json.loads(line)
-                if entry["kind"] == "start":
+                if entry["kind"] in ("start", "turned"):
                     start = entry["content"]
                 else:
                     last = entry["content"]["decision"]

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import gzip
 import json
+import time
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from mpc.errors import LiveError
-from mpc.live.audit import NOTHING, AuditLog, canonical, read_log
+from mpc.live.audit import NOTHING, AuditLog, canonical, log_files, read_log
 from mpc.live.guard.decide import Guard
 from mpc.live.guard.rules import GuardRules, Limits, PointRule
-from mpc.live.replay import replay_log
+from mpc.live.replay import Replay, replay_log, replay_logs
 
 SET = "hall/supply_air_temperature_setpoint"
 RULES = GuardRules(
@@ -23,7 +25,8 @@ RULES = GuardRules(
 
 def guarded(folder: Path, ticks: int = 6) -> Path:
     """Log of a guard that takes a plan, follows it and doubts in the end."""
-    log, guard = AuditLog(folder, "guard", 0.0), Guard(RULES)
+    guard = Guard(RULES)
+    log = AuditLog(folder, "guard", lambda: {"code": "x", "rules": RULES.to_dict(), "state": guard.state.to_dict()})
     log.append("start", {"code": "x", "rules": RULES.to_dict(), "modes": {}, "held_before": {}, "wall": 0.0})
     slots: dict[str, float] = {}
     for k in range(ticks):
@@ -43,7 +46,7 @@ def guarded(folder: Path, ticks: int = 6) -> Path:
 
 def test_a_log_replays(tmp_path: Path) -> None:
     path = guarded(tmp_path)
-    found = replay_log(path, before=NOTHING)
+    found = replay_log(path, earlier=Replay(last=NOTHING))
     assert found.fine and found.lines == 7 and found.decisions == 6
     assert found.notes and "was written by x" in found.notes[0]
     decisions = [e["content"]["decision"] for _, e in read_log(path) if e["kind"] == "tick"]
@@ -65,13 +68,13 @@ def test_a_log_replays(tmp_path: Path) -> None:
 def test_what_breaks_the_chain_is_named(tmp_path: Path, spoil: Any, line: str) -> None:
     path = guarded(tmp_path)
     path.write_bytes(b"".join(spoil(path.read_bytes().splitlines(keepends=True))))
-    found = replay_log(path, before=NOTHING)
+    found = replay_log(path, earlier=Replay(last=NOTHING))
     assert not found.fine and f"{path.name}: {line}:" in found.broken
 
 
 def test_a_decision_that_was_forged_with_its_chain_does_not_replay(tmp_path: Path) -> None:
     entries = [e for _, e in read_log(guarded(tmp_path / "a"))]
-    log = AuditLog(tmp_path / "b", "guard", 0.0)
+    log = AuditLog(tmp_path / "b", "guard")
     for entry in entries:
         if entry["kind"] == "tick" and entry["content"]["decision"]["writes"]:
             entry["content"]["decision"]["writes"][SET] = 291.0
@@ -87,9 +90,52 @@ def test_files_go_on_from_each_other_and_a_torn_line_is_left_out(tmp_path: Path)
         file.write(b'{"n": 7, "torn')
     second = guarded(tmp_path)
     assert second.name == "guard-000001.jsonl"
-    last = replay_log(first).last
-    assert replay_log(first).fine and replay_log(second, before=last).fine
-    assert "before it" in replay_log(second, before="0" * 64).broken
+    assert all(one.fine for one in replay_logs([first, second]).values())
+    assert "before it" in replay_log(second, earlier=Replay(last=NOTHING)).broken
+
+
+def test_a_full_file_is_turned_and_compressed_and_each_replays_by_itself(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("mpc.live.audit.LARGEST", 4000)
+    guarded(tmp_path, ticks=40)
+    deadline = time.monotonic() + 20.0
+    while len(list(tmp_path.glob("*.gz"))) < len(log_files(tmp_path)) - 1 and time.monotonic() < deadline:
+        time.sleep(0.01)
+    files = log_files(tmp_path, "guard")
+    assert len(files) > 4 and [file.suffix for file in files] == [".gz"] * (len(files) - 1) + [".jsonl"]
+    together = replay_logs(files)
+    assert all(one.fine for one in together.values()) and sum(one.decisions for one in together.values()) == 40
+    alone = [replay_log(file) for file in files]
+    assert all(one.fine for one in alone) and [one.decisions for one in alone] == [
+        one.decisions for one in together.values()
+    ]
+    assert "before it" in replay_logs([files[0], files[2]])[files[2]].broken  # a file is missing
+    first = gzip.decompress(files[1].read_bytes())
+    files[1].with_suffix("").write_bytes(first)  # as one that was killed while it compressed leaves it
+    assert log_files(tmp_path)[1].suffix == ".jsonl" and len(log_files(tmp_path)) == len(files)
+    files[2].write_bytes(files[2].read_bytes()[:-9])
+    assert "a whole compressed file" in replay_log(files[2]).broken
+    (tmp_path / "guard-000000.jsonl.part").touch()
+    monkeypatch.undo()
+    guarded(tmp_path)
+    assert not list(tmp_path.glob("*.part"))
+
+
+def test_a_state_that_was_forged_where_a_file_turns_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("mpc.live.audit.LARGEST", 4000)
+    guarded(tmp_path / "a", ticks=12)
+    log: AuditLog | None = None
+    monkeypatch.setattr("mpc.live.audit.LARGEST", 10**9)
+    for number, path in enumerate(log_files(tmp_path / "a")):
+        log = AuditLog(tmp_path / "b", "guard")
+        for _, entry in read_log(path):
+            if number and entry["kind"] == "turned":
+                entry["content"]["state"]["modes"][SET] = "shadow"
+            log.append(entry["kind"], entry["content"])
+        log.close()
+    second = list(replay_logs(log_files(tmp_path / "b")).values())[1]
+    assert "line 1: another state than that at the end of the file before" in second.different[0]
 
 
 def test_only_finite_numbers_of_one_spelling() -> None:

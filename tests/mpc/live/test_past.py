@@ -22,8 +22,8 @@ def inputs(begin: float, zone: float | None) -> dict[str, Any]:
     return {"begin": begin, "means": means, "forecast": {"columns": columns, "values": values}}
 
 
-def written(folder: Path, name_of_end: float, *contents: dict[str, Any]) -> AuditLog:
-    log = AuditLog(folder, "controller", name_of_end)
+def written(folder: Path, *contents: dict[str, Any]) -> AuditLog:
+    log = AuditLog(folder, "controller")
     log.append("start", {})
     for content in contents:
         log.append("plan", {"inputs": content, "plan": {}})
@@ -33,8 +33,8 @@ def written(folder: Path, name_of_end: float, *contents: dict[str, Any]) -> Audi
 
 def test_the_last_two_days_are_read_over_files_and_what_is_damaged_is_left_out(tmp_path: Path) -> None:
     old = [inputs(NOW - SPAN - STEP, 280.0), inputs(NOW - 5 * STEP, 291.0), inputs(NOW - 4 * STEP, None)]
-    written(tmp_path, NOW, *old)
-    last = written(tmp_path, NOW, inputs(NOW - 3 * STEP, 293.0) | {"forecast": None}, inputs(NOW, 300.0))
+    written(tmp_path, *old)
+    last = written(tmp_path, inputs(NOW - 3 * STEP, 293.0) | {"forecast": None}, inputs(NOW, 300.0))
     with last.path.open("ab") as file:
         file.write(b'{"kind":"plan","content":{"inp\n{"kind":"plan","content":{}}\n')
     past = recent_past(tmp_path, NOW, [ZONE])
@@ -42,6 +42,9 @@ def test_the_last_two_days_are_read_over_files_and_what_is_damaged_is_left_out(t
     assert past[0]["means"] == {ZONE: 291.0} and past[2]["ahead"] == {}
     assert set(past[0]["ahead"]) == {OUTDOOR, "north/internal_gain"}
     assert recent_past(tmp_path / "nothing", NOW, [ZONE]) == []
+    (tmp_path / "controller-000000.jsonl.gz").write_bytes(b"damaged")
+    (tmp_path / "controller-000000.jsonl").unlink()
+    assert [one["begin"] for one in recent_past(tmp_path, NOW, [ZONE])] == [NOW - 3 * STEP]
 
     table = past_table(past, NOW, STEP, "Europe/Brussels", "station")
     stamps = [pd.Timestamp(NOW - k * STEP, unit="s", tz="UTC") for k in (5, 4, 3, 2, 1)]

@@ -243,6 +243,12 @@ def test_a_start_goes_on_with_modes_and_what_was_left(tmp_path: Path) -> None:
     path = site.folder / "guard-000000.jsonl"
     path.write_text(json.dumps(line) + "\n" + json.dumps(tick) + '\n{"torn')
     assert left_before(site) == ({SET: "shadow"}, {SET: 291.0})
+    more = {"modes": {SET: "act"}, "held_before": {SET: 292.0}}
+    turned = {"kind": "turned", "content": {"rules": {"configuration": site.hash}, **more}}
+    path.with_name("guard-000001.jsonl").write_text(json.dumps(turned) + "\n")
+    assert left_before(site) == ({SET: "act"}, {SET: 292.0})
+    path.with_name("guard-000001.jsonl").rename(path.with_name("guard-000001.jsonl.gz"))  # damaged: it is none
+    assert left_before(site) == ({SET: "shadow"}, {SET: 291.0})
     line["content"]["rules"] = {"configuration": "another"}  # type: ignore[index]
     path.write_text(json.dumps(line) + "\n" + json.dumps(tick) + "\n")
     assert left_before(site) == ({}, {SET: 291.0})
