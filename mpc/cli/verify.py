@@ -11,6 +11,8 @@ from mpc.cli import options
 from mpc.cli.console import Waiting, answer, say, show_table
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
+
     from mpc.verification.verify import Period, Verification
 
 
@@ -25,6 +27,9 @@ def verify(
     occupancy: Annotated[str, options.value("Column of people.", "COLUMN")] = "",
     zone: Annotated[str, options.value("Column of the zones' mean temperature.", "COLUMN")] = "",
     predicted: Annotated[str, options.value("Column of the power that shadow expected to save.", "COLUMN")] = "",
+    rehearsed: Annotated[
+        Path | None, options.file("days.parquet of `buildingmpc rehearse`, in the place of --predicted.")
+    ] = None,
     baseline: Annotated[str, options.value("Days before, local.", "START/END")] = "",
     reporting: Annotated[str, options.value("Days after, local.", "START/END")] = "",
     model: Annotated[str, options.value("Of the baseline: change-point or time-of-week.", "NAME")] = "change-point",
@@ -40,6 +45,7 @@ def verify(
     Example: buildingmpc verify meters.parquet --power "main [kW]" --outdoor outdoor --acts mode --out saved
     """
     from calibration.results import check_results_folder
+    from mpc.errors import VerificationError
     from mpc.reports.verification import verification_summary, write_verification
     from mpc.verification.metered import MeteredColumns, read_metered
     from mpc.verification.verify import VerificationSettings
@@ -47,16 +53,32 @@ def verify(
     from thermal.intake.source import shown
 
     check_results_folder(out, force)
+    VerificationError.unless(not (predicted and rehearsed), "--rehearsed", "it or --predicted", "both")
     columns = MeteredColumns(tuple(power), outdoor, acts, occupancy, zone, predicted)
     periods = (_period(baseline, "--baseline", tz), _period(reporting, "--reporting", tz))
     settings = VerificationSettings(*periods, model, options.ids(adjust), options.share(confidence, "--confidence"))
     with Waiting(f"verify {shown(source)}") as progress:
         progress("reading", 0, 2)
         metered = read_metered(source, columns, tz, table)
+        if rehearsed is not None:
+            metered = metered.with_rehearsed(_days(rehearsed), str(rehearsed))
         progress("fitting", 1, 2)
         found = verified(metered, settings, shown(source))
         report = write_verification(found, out, force=force)
     return answer(json, verification_summary(found), lambda: _show(found), report)
+
+
+def _days(path: Path) -> DataFrame:
+    """Read the days of a rehearsal."""
+    from pandas import read_parquet
+
+    from mpc.errors import VerificationError
+
+    try:
+        return read_parquet(path)
+    except (OSError, ValueError) as error:  # pyarrow's own errors are both
+        advice = "make it with `buildingmpc rehearse site.yaml --out DIR`"
+        raise VerificationError(str(path), "days.parquet of a rehearsal", str(error), advice) from error
 
 
 def _period(text: str, where: str, timezone: str) -> Period | None:

@@ -89,10 +89,14 @@ def _means(found: Rehearsal) -> Means:
     else:
         answer = f"Acting would have {'saved' if found.saving > 0.0 else 'added'} {percent(abs(found.saving))}."
     trust = (
-        "Both controls were run by the model that plans are made with: what it lacks has no part in this. On the first "
-        "day acting also takes what the building's own control had stored."
+        "Both controls were run by the model that plans are made with, with the heat that it was found to lack in "
+        "these days. On the first day acting also takes what the building's own control had stored."
     )
-    return Means(answer, trust, "Rehearse a week of shadow or more; then act on alternate days, and verify them.")
+    following = (
+        "Rehearse a week of shadow or more; then act on alternate days, and verify them: `buildingmpc verify` holds "
+        "these days (`--rehearsed days.parquet`) against what is metered."
+    )
+    return Means(answer, trust, following)
 
 
 @styled

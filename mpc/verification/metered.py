@@ -96,6 +96,34 @@ class Metered:
         days["weekend"] = (pd.DatetimeIndex(days.index).day_of_week >= 5).astype(float)
         return days
 
+    def with_rehearsed(self, days: pd.DataFrame, where: str = "rehearsed days") -> "Metered":
+        """Take what a rehearsal foretold for what shadow operation expected to save.
+
+        Parameters
+        ----------
+        days : DataFrame, shape (n_day, n_column)
+            Of `mpc.live.rehearsal.Rehearsal`: by local midnight, with ``own_energy`` and ``energy`` [kWh].
+        where : str
+            Where they are from, for messages.
+
+        Raises
+        ------
+        VerificationError
+            When days are no such table, or none of them was metered.
+        """
+        kept, index = days.filter(["own_energy", "energy"]), days.index
+        fits = kept.shape[1] == 2 and isinstance(index, pd.DatetimeIndex) and index.tz is not None
+        expected = "local days with own_energy and energy [kWh], as days.parquet of `buildingmpc rehearse`"
+        VerificationError.unless(fits, where, expected, ", ".join(map(str, days)) or "no column")
+        midnights = pd.DatetimeIndex(pd.DatetimeIndex(self.hours.index) - pd.Timedelta(hours=1)).normalize()
+        saved = (kept["own_energy"] - kept["energy"]).tz_convert(midnights.tz)
+        kilowatt_hours = saved.reindex(midnights).to_numpy()
+        length = (midnights + pd.DateOffset(days=1) - midnights).to_numpy() / np.timedelta64(1, "h")
+        found = f"{index.min():%Y-%m-%d} to {index.max():%Y-%m-%d}"
+        advice = "rehearse days of shadow that are in the table, and name the building's clock with --tz"
+        VerificationError.unless(np.isfinite(kilowatt_hours).any(), where, "days that were metered", found, advice)
+        return Metered(self.hours.assign(predicted=1000.0 * kilowatt_hours / length))
+
 
 def read_metered(source: str, columns: MeteredColumns, timezone: str = "", table: str = "") -> Metered:
     """Read metered energy from a table of any kind.

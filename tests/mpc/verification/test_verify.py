@@ -115,6 +115,38 @@ def test_shadow_is_held_against_what_was_realised(make_days: MakeDays, by_hour: 
         assert (not low <= 0.0 <= high) == differs
 
 
+def test_a_rehearsal_is_what_shadow_expected(
+    make_days: MakeDays, by_hour: MakeDays, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Days of shadow that acting is said to save 15 % of, beside days that saved 15 %."""
+    days = make_days(6, np.concatenate([np.zeros(14), np.arange(56) // 2 % 2]), n=70, saving=0.15)
+    table, out = by_hour(days), tmp_path / "saved"
+    table.to_parquet(tmp_path / "meters.parquet")
+    daily = metered(table, tmp_path, COLUMNS).days()["power"].iloc[:14] * 86400.0 / 3.6e6
+    told = pd.DataFrame({"own_energy": 0.9 * daily, "energy": 0.75 * daily})
+    told.to_parquet(tmp_path / "days.parquet")
+    given = ["verify", str(tmp_path / "meters.parquet"), "--power", "main [kW]", "--outdoor", "outdoor", "--acts", "mode",
+             "--tz", "Etc/GMT-1", "--out", str(out)]  # fmt: skip
+    with pytest.raises(SystemExit) as ended:
+        app([*given, "--rehearsed", str(tmp_path / "days.parquet")])
+    assert ended.value.code == 0, capsys.readouterr().err
+    found = json.loads((out / "verification.json").read_text())
+    assert found["predicted"]["value"] == pytest.approx(0.15, abs=1e-9)
+    low, high = found["realised_less_predicted"]["interval"]
+    assert low < 0.0 < high
+    read = metered(table, tmp_path, COLUMNS)
+    with pytest.raises(VerificationError, match="days that were metered, found 2027-"):
+        read.with_rehearsed(told.set_index(told.index + pd.DateOffset(years=1)))
+    with pytest.raises(VerificationError, match="own_energy and energy .* found cost"):
+        read.with_rehearsed(pd.DataFrame({"cost": 1.0}, index=told.index))
+    for bad, says in (("meters.csv", "a rehearsal"), ("days.parquet", "it or --predicted, found both")):
+        (tmp_path / "meters.csv").write_text("no parquet")
+        more = ["--predicted", "x"] if bad == "days.parquet" else []
+        with pytest.raises(SystemExit) as ended:
+            app([*given, "--force", "--rehearsed", str(tmp_path / bad), *more])
+        assert ended.value.code == 2 and says in capsys.readouterr().err
+
+
 def test_the_command_writes_a_page(
     make_days: MakeDays, by_hour: MakeDays, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
