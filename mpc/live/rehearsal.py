@@ -272,8 +272,9 @@ def _as_recorded(
     table.loc[:, weather] = table.loc[:, weather].interpolate(limit_direction="both")
     now, table = now.take(taken - low).set_index(stamps), table.iloc[low - steps :].take(taken - low).set_index(stamps)
     expected = [OCCUPANCY_POINT, "internal_gain"] if gains else [OCCUPANCY_POINT]
-    foreseen = [f"{name}/{point}" for point in expected for name in building.zone_names]
-    return now, table.assign(**{column: now[column] for column in foreseen if column in now})
+    names = [f"{name}/{point}" for point in expected for name in building.zone_names]
+    foreseen = now.filter(names)
+    return now, pd.concat([table.drop(columns=list(foreseen), errors="ignore"), foreseen], axis=1)
 
 
 def _scenario(
