@@ -85,7 +85,7 @@ def compare(seed: int, days: int) -> dict[str, Any]:
             site = Site(device.begin("postgresql:///none", more={"controller": "mpc", "model": model}))
         finally:
             device.stop()
-        log = AuditLog(site.folder, "controller")
+        log = AuditLog(site.folder, "controller", dict)
         shadow = run_week(plant, site, log, days)
         log.close()
         foretold, acted = rehearse(site), run_week(plant, site, None, days)

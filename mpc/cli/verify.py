@@ -28,7 +28,8 @@ def verify(
     zone: Annotated[str, options.value("Column of the zones' mean temperature.", "COLUMN")] = "",
     predicted: Annotated[str, options.value("Column of the power that shadow expected to save.", "COLUMN")] = "",
     rehearsed: Annotated[
-        Path | None, options.file("days.parquet of `buildingmpc rehearse`, in the place of --predicted.")
+        Path | None,
+        options.file("days.parquet of `buildingmpc rehearse`, electricity and fuel, in the place of --predicted."),
     ] = None,
     baseline: Annotated[str, options.value("Days before, local.", "START/END")] = "",
     reporting: Annotated[str, options.value("Days after, local.", "START/END")] = "",
@@ -64,6 +65,10 @@ def verify(
             metered = metered.with_rehearsed(_days(rehearsed), str(rehearsed))
         progress("fitting", 1, 2)
         found = verified(metered, settings, shown(source))
+        VerificationError.unless(
+            rehearsed is None or found.predicted is not None, "--rehearsed", "three metered days of the own control",
+            "fewer", "rehearse more days of shadow",
+        )  # fmt: skip
         report = write_verification(found, out, force=force)
     return answer(json, verification_summary(found), lambda: _show(found), report)
 

@@ -7,13 +7,14 @@ import gzip
 import hashlib
 import json
 import os
+import re
 import shutil
 import zlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from threading import Thread
+from threading import Lock, Thread
 from typing import Any
 
 from mpc.errors import LiveError
@@ -24,7 +25,7 @@ NOTHING = "0" * 64
 #: Length of a file from which on a further one is begun [bytes]: half a day of the pilot's plans.
 LARGEST = 32_000_000
 
-_PLAIN, _HALF = ".jsonl", ".part"
+_PLAIN, _HALF, _NAMED = ".jsonl", ".part", re.compile(r".+-\d+\.jsonl(\.gz)?")
 
 
 def canonical(content: Any) -> str:
@@ -60,23 +61,25 @@ class AuditLog:
         Where the files are.
     name : str
         Of the process, such as ``guard``.
-    again : callable, optional
-        Gives what a further file must say first, so that it can be read without those before it; nothing by default.
+    again : callable
+        Gives what a further file must say first, so that it can be read without those before it.
 
     Raises
     ------
     LiveError
-        From `append`, when the disk does not take the line.
+        When the disk does not take a line or a file, or a closed log is to take one.
     """
 
-    def __init__(self, folder: Path, name: str, again: Callable[[], Mapping[str, Any]] = dict) -> None:
+    def __init__(self, folder: Path, name: str, again: Callable[[], Mapping[str, Any]]) -> None:
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        for half in folder.glob(f"{name}-*{_HALF}"):
+            half.unlink(missing_ok=True)
         earlier, self._again, self._length = log_files(folder, name), again, 0
         self._before, self._number = _end(earlier[-1]) if earlier else (NOTHING, -1)
-        self._name, self._count = name, _place(earlier[-1])[1] + 1 if earlier else 0
-        for half in folder.glob(f"{name}-*{_HALF}"):
-            half.unlink()
+        self._name, self._count = name, _place(earlier[-1])[1] if earlier else -1
+        self._writing, self._closed = Lock(), False
         self.path, self._file = self._begun(folder)
+        _compress_beside([p for p in earlier if p.suffix == _PLAIN and p.stat().st_size >= LARGEST])
 
     @property
     def last(self) -> str:
@@ -93,10 +96,16 @@ class AuditLog:
         content : mapping
             Plain types, finite numbers.
         """
-        digest = self._add(kind, content)
-        if self._length >= LARGEST:
-            self._turn()
-        return digest
+        with self._writing:
+            LiveError.unless(not self._closed, "audit log", "one that is open", "a closed one")
+            try:
+                digest = self._add(kind, content)
+                if self._length >= LARGEST and not self._closed:
+                    self._turn()
+                return digest
+            finally:
+                if self._closed:  # meanwhile, by who could not wait for the disk
+                    os.close(self._file)
 
     def _add(self, kind: str, content: Mapping[str, Any]) -> str:
         entry = {"n": self._number + 1, "before": self._before, "kind": kind, "content": content}
@@ -112,6 +121,7 @@ class AuditLog:
         return digest
 
     def _begun(self, folder: Path) -> tuple[Path, int]:
+        self._count, self._length = self._count + 1, 0
         path = folder / f"{self._name}-{self._count:06d}{_PLAIN}"
         try:
             return path, os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_EXCL, 0o600)
@@ -120,15 +130,21 @@ class AuditLog:
 
     def _turn(self) -> None:
         """Go on in a further file; the full one is compressed beside."""
-        full, self._count, self._length = self.path, self._count + 1, 0
-        os.close(self._file)
+        full, file = self.path, self._file
         self.path, self._file = self._begun(full.parent)
+        with contextlib.suppress(OSError):  # every line of it is on disk
+            os.close(file)
         self._add("turned", self._again())
-        Thread(target=_compress, args=(full,), daemon=True).start()
+        _compress_beside([full])
 
     def close(self) -> None:
-        """End the file."""
-        os.close(self._file)
+        """End the file; at once, even where a line is still waiting for the disk."""
+        if self._closed:
+            return
+        self._closed = True
+        if self._writing.acquire(blocking=False):
+            os.close(self._file)
+            self._writing.release()
 
 
 def log_files(folder: Path, name: str = "*") -> list[Path]:
@@ -141,8 +157,9 @@ def log_files(folder: Path, name: str = "*") -> list[Path]:
     name : str
         Of the process; all by default.
     """
-    found = {_place(path): path for path in sorted(folder.glob(f"{name}-[0-9]*{_PLAIN}.gz"))}
-    found |= {_place(path): path for path in folder.glob(f"{name}-[0-9]*{_PLAIN}")}  # one that is being compressed
+    plain = {_place(path): path for path in folder.glob(f"{name}-*{_PLAIN}") if _NAMED.fullmatch(path.name)}
+    packed = {_place(path): path for path in folder.glob(f"{name}-*{_PLAIN}.gz") if _NAMED.fullmatch(path.name)}
+    found = packed | plain  # in this order of looking: one that is being compressed is never missed
     return [found[place] for place in sorted(found)]
 
 
@@ -159,7 +176,11 @@ def log_lines(path: Path) -> list[bytes]:
     LiveError
         When it cannot be unpacked.
     """
-    content = path.read_bytes()
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError:  # it has been compressed meanwhile
+        path = path.with_name(path.name + ".gz")
+        content = path.read_bytes()
     if path.suffix == ".gz":
         try:
             content = gzip.decompress(content)
@@ -174,10 +195,19 @@ def _place(path: Path) -> tuple[str, int]:
     return name, int(number)
 
 
+def _compress_beside(full: Sequence[Path]) -> None:
+    def compress() -> None:
+        for path in full:
+            _compress(path)
+
+    if full:
+        Thread(target=compress, daemon=True).start()
+
+
 def _compress(full: Path) -> None:
     """Put a compressed file in the place of a full one; where that fails it stays as it is."""
     half = full.with_name(full.name + _HALF)
-    with contextlib.suppress(OSError):
+    try:
         with full.open("rb") as source, half.open("wb") as file:
             os.chmod(half, 0o600)
             with gzip.GzipFile(full.name, "wb", 6, file, 0) as target:
@@ -186,6 +216,9 @@ def _compress(full: Path) -> None:
             os.fsync(file.fileno())
         half.replace(full.with_name(full.name + ".gz"))
         full.unlink()
+    except OSError:
+        with contextlib.suppress(OSError):
+            half.unlink(missing_ok=True)
 
 
 def _end(path: Path) -> tuple[str, int]:

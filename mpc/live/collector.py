@@ -49,8 +49,9 @@ class Collector:
             Historian(database.address, database.schema_name), Spool(site.folder / "spool", database.spool * 10**6),
             units, retry=self.clock.real(10.0),
         )  # fmt: skip
-        self.log = AuditLog(site.folder, "collector")
-        self.log.append("start", {"code": code_version(), "configuration": site.hash, "wall": self.clock.wall()})
+        begin = {"code": code_version(), "configuration": site.hash, "wall": self.clock.wall()}
+        self.log = AuditLog(site.folder, "collector", lambda: begin)
+        self.log.append("start", begin)
         self._pace = Pace(self.clock)
         self._trimmed = -math.inf
         self.lost = 0

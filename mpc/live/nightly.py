@@ -167,8 +167,9 @@ def run_nightly(site: Site, clock: Clock | None = None) -> int:
     if not asyncio.run(waited()):
         return 0
     before, now = read_state(nightly.state_path), clock.wall()
-    log = AuditLog(site.folder, "nightly")
-    log.append("start", {"code": code_version(), "configuration": site.hash, "wall": now})
+    begin = {"code": code_version(), "configuration": site.hash, "wall": now}
+    log = AuditLog(site.folder, "nightly", lambda: begin)
+    log.append("start", begin)
     state = nightly.evaluate(now)
     log.append("night", {key: value for key, value in state.items() if key != "weekly"})
     log.close()

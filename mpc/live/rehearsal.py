@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -171,10 +170,9 @@ def rehearse(
         raise LiveError(where, expected, "none", "calibrate the building, and name it under `model`")
     if begin is not None and end is not None:
         LiveError.unless(end > begin, "end", f"a time after {begin}", end)
-    recorded = _recorded(site.folder, begin, end)
+    recorded = _recorded(site, begin, end)
     low = -math.inf if begin is None else begin.timestamp()
     before, times = sorted(t for t in recorded.now if t < low), sorted(t for t in recorded.now if t >= low)
-    times = [t for t in times if (t - times[0]) % site.step == 0.0]  # the control step may have been another one
     whole = _whole_days(times, site)
     expected, found = "a day of the controller's plans with their forecasts", f"{len(times) or 'no'} steps"
     LiveError.unless(whole.size, f"{site.folder}", expected, f"{found}{recorded.reach(site)}", "let it run in shadow")
@@ -183,13 +181,18 @@ def rehearse(
     taken = np.arange(round((before[0] - first) / site.step) if before else 0, steps)
     if taken.size < week + steps and week <= steps:
         taken = np.r_[0:week, 0:steps]
-    taken = np.r_[np.tile(taken[:day], _FIRST_DAY), taken]
+    taken = np.r_[np.tile(np.resize(taken[:day], day), _FIRST_DAY), taken]
     lead = taken.size - steps
     building, system, parameters = believed(site, entry)
     step = MODEL_STEP if site.step % MODEL_STEP == 0.0 else site.step
     gains = "internal_gains" not in model_settings(parameters).effects  # which the model has itself otherwise
     now, table = _as_recorded(site, building, recorded, first, taken, gains)
     observed = building_controller(site, entry, site_actuators(site))
+    points = [name for name in observed.columns if name in site.file.points]
+    known = float(table.reindex(columns=points).iloc[lead:].notna().to_numpy().mean())
+    advice = "let it run in shadow with this model: the heat that it lacks is told by these points"
+    expected = "nine tenths of what zones and terminals showed on these days"
+    LiveError.unless(known >= _ON_RECORD, f"{site.folder}", expected, f"{known:.0%}", advice)
     scenario = _scenario(site, building, now, table, observed.start_up(table), step)
     plant = SimulatedPlant(
         scenario, system, ReducedBuilding(control_model(building, parameters), step_seconds=step),
@@ -231,14 +234,17 @@ def _whole_days(times: Sequence[float], site: Site) -> pd.DatetimeIndex:
     return pd.DatetimeIndex(each.index[each.to_numpy() * site.step >= _ON_RECORD * DAY])
 
 
-def _recorded(folder: Path, begin: pd.Timestamp | None, end: pd.Timestamp | None) -> _Recorded:
-    """Read the controller's logs, of a week before too; a line that cannot be read is left out, and not judged here."""
+def _recorded(site: Site, begin: pd.Timestamp | None, end: pd.Timestamp | None) -> _Recorded:
+    """Read the controller's logs, of a week before too; a line that cannot be read is left out, and not judged here.
+
+    So are steps of other lengths: the control step may have been another one.
+    """
     low = -math.inf if begin is None else begin.timestamp() - _WEEK * DAY
     high = math.inf if end is None else end.timestamp()
     past, found = dict[float, dict[str, Any]](), _Recorded([], {}, {}, {}, [])
-    for at, inputs, plan, row in plans_on_record(folder):
+    for at, inputs, plan, row in plans_on_record(site.folder):
         found.ends[:] = [min([at, *found.ends]), max([at, *found.ends])]
-        if not low <= at < high or not row:
+        if not low <= at < high or not row or at % site.step:
             continue
         try:
             found.forecasts[at] = forecast_of_dict(inputs["forecast"])

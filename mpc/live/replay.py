@@ -64,9 +64,12 @@ def replay_logs(paths: Iterable[Path], site: Path | None = None) -> dict[Path, R
     found, last = dict[Path, Replay](), dict[str, Replay]()
     for path in paths:
         process = path.name.rpartition("-")[0]
-        found[path] = replay_log(path, site, last.get(process))
-        if found[path].last:
-            last[process] = found[path]
+        earlier = last.get(process)
+        one = found[path] = replay_log(path, site, earlier)
+        if one.last:
+            last[process] = one
+            if earlier is not None:
+                earlier.guard = earlier.planner = None  # each holds a solver
     return found
 
 

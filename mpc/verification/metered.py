@@ -112,15 +112,22 @@ class Metered:
             When days are no such table, or none of them was metered.
         """
         kept, index = days.filter(["own_energy", "energy"]), days.index
-        fits = kept.shape[1] == 2 and isinstance(index, pd.DatetimeIndex) and index.tz is not None
-        expected = "local days with own_energy and energy [kWh], as days.parquet of `buildingmpc rehearse`"
+        zoned = isinstance(index, pd.DatetimeIndex) and index.tz is not None and index.is_unique
+        fits = zoned and len(kept.select_dtypes("number").columns) == 2
+        expected = "local days, each once, with own_energy and energy [kWh], as days.parquet of `buildingmpc rehearse`"
         VerificationError.unless(fits, where, expected, ", ".join(map(str, days)) or "no column")
         midnights = pd.DatetimeIndex(pd.DatetimeIndex(self.hours.index) - pd.Timedelta(hours=1)).normalize()
         saved = (kept["own_energy"] - kept["energy"]).tz_convert(midnights.tz)
+        advice = "name the clock of the building with --tz"
+        local = pd.DatetimeIndex(saved.index)
+        VerificationError.unless(
+            bool((local == local.normalize()).all()), where, f"days that begin at midnight in {midnights.tz}",
+            str(local[0]) if len(local) else "none", advice,
+        )  # fmt: skip
         kilowatt_hours = saved.reindex(midnights).to_numpy()
         length = (midnights + pd.DateOffset(days=1) - midnights).to_numpy() / np.timedelta64(1, "h")
-        found = f"{index.min():%Y-%m-%d} to {index.max():%Y-%m-%d}"
-        advice = "rehearse days of shadow that are in the table, and name the building's clock with --tz"
+        found = f"{index.min():%Y-%m-%d} to {index.max():%Y-%m-%d}" if len(index) else "none"
+        advice = "rehearse days of shadow that are in the table"
         VerificationError.unless(np.isfinite(kilowatt_hours).any(), where, "days that were metered", found, advice)
         return Metered(self.hours.assign(predicted=1000.0 * kilowatt_hours / length))
 

@@ -26,7 +26,7 @@ from thermal.case.load import load_building
 
 def record(site: Site, plant: Any, days: int = 1) -> None:
     """Log plans of days under the building's own control, with what they rest on."""
-    log, each = AuditLog(site.folder, "controller"), round(site.step / plant.control_step)
+    log, each = AuditLog(site.folder, "controller", dict), round(site.step / plant.control_step)
     seen, columns = [plant.reset()], plant.columns
     for _ in range(96 * days):
         means = dict(zip(columns, np.mean([s.values_array for s in seen], axis=0).tolist(), strict=True))
@@ -42,6 +42,10 @@ def test_a_recorded_day_is_run_through_anew(office_site: Callable[[float], Any],
     device.stop()
     site, out = Site(path), tmp_path / "rehearsed"
     record(site, plant)
+    other = AuditLog(site.folder, "controller", dict)  # a plan of another control step counts for nothing
+    at = pd.Timestamp("2023-01-09T03:10", tz="Etc/GMT+8").timestamp()
+    other.append("plan", {"inputs": {"begin": at, "means": {}, "forecast": forecast_to_dict(plant.forecast())}, "plan": {}})
+    other.close()
     made = CliRunner().invoke(app, ["rehearse", str(site.path), "--out", str(out), "--json"])
     assert made.exit_code == 0, made.output
     told, done = json.loads(made.stdout), plant.bought().iloc[0]
@@ -59,6 +63,10 @@ def test_a_recorded_day_is_run_through_anew(office_site: Callable[[float], Any],
         rehearse(site, begin + pd.DateOffset(years=1))
     with pytest.raises(LiveError, match="end: expected a time after 2023-01-09 12:00"):
         rehearse(site, begin, begin)
+    log = site.folder / "controller-000000.jsonl"
+    log.write_text(log.read_text().replace("/supply_air_flowrate_sensor", "/another_sensor"))
+    with pytest.raises(LiveError, match="expected nine tenths of what zones and terminals showed .* found 7"):
+        rehearse(site)
 
 
 def own_cost(site: Site, gain: float) -> float:

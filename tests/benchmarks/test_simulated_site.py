@@ -184,7 +184,7 @@ def test_an_office_with_air_handlers_is_a_site_and_is_planned_by_its_building(
         lost = planner.plan(inputs | {"forecast": forecast_to_dict(without)})
         assert lost["values"] == {} and lost["status"].startswith("no plan: forecast lacks 'electricity_price'")
 
-        log = AuditLog(site.folder, "controller")
+        log = AuditLog(site.folder, "controller", dict)
         going, fresh, again = (Planner(site) for _ in range(3))
         for _ in range(12):
             made = going.plan(inputs)

@@ -68,7 +68,7 @@ def test_a_site_is_checked(tmp_path: Path) -> None:
 
 def test_logs_are_replayed_in_order(tmp_path: Path) -> None:
     for kind in ("a", "b"):
-        log = AuditLog(tmp_path, "collector")
+        log = AuditLog(tmp_path, "collector", dict)
         log.append(kind, {"x": 1})
         log.close()
     code, text = run("replay", tmp_path, "--json")

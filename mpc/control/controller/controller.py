@@ -158,14 +158,17 @@ class MpcController:
         if self.signals is not None:
             stamps = pd.DatetimeIndex([stamp for stamp, *_ in steps])
             others = self.signals(self.points.past_forecast(telemetry), stamps)
-        started, lacked = False, []
-        for (stamp, measured, outdoor, gains), other in zip(steps, others, strict=True):
-            read = self.points.read(measured, self._system)
-            boundary, seen = np.concatenate([[outdoor], other]), np.isfinite(read.zone)
+        started, lacked, held = False, [], np.zeros(len(self.points.zones))
+        reads = [self.points.read(measured, self._system) for _, measured, *_ in steps]
+        never = np.isnan([read.heat for read in reads]).all(axis=0)  # such heat counts as unmeasured
+        for (stamp, _, outdoor, gains), read, other in zip(steps, reads, others, strict=True):
+            boundary, metered = np.concatenate([[outdoor], other]), np.isfinite(read.heat) | never
+            held = np.where(np.isfinite(read.heat), read.heat, held)
             if started:
-                heat = np.nan_to_num(read.heat)
-                self.observer.update(read.zone, heat + gains, self.observer.with_emitted(boundary, heat))
-            elif seen.any():
+                # where heat was lost the model goes on alone, or it would be taken for heat that the model lacks
+                zone, given = np.where(metered, read.zone, np.nan), self.observer.with_emitted(boundary, held)
+                self.observer.update(zone, held + gains, given)
+            elif (seen := np.isfinite(read.zone)).any():
                 self.observer.start(np.where(seen, read.zone, read.zone[seen].mean()), boundary)
                 started = True
             self._count(read, stamp)

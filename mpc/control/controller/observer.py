@@ -43,7 +43,7 @@ class Observer:
         self.state = np.zeros(kalman.whole.n)
 
     def start(self, zone: FloatArray, boundary: FloatArray) -> None:
-        """Start from the steady state that holds the zones where they are.
+        """Start from the steady state that holds the zones where they are, without unmeasured heat.
 
         Parameters
         ----------

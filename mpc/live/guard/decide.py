@@ -196,7 +196,7 @@ class Guard:
     def _results(self, tick: Tick) -> list[str]:
         """Take what became of the last orders; a write that failed may have been done."""
         state, doubts = self.state, []
-        for name, value in state.orders.items():
+        for name, value in sorted(state.orders.items()):
             error = tick["results"].get(name, "no answer")
             if value is None:
                 continue  # a release is believed when a reading shows it

@@ -131,7 +131,7 @@ class GuardProcess:
             "mono": self.clock.mono(), "wall": self.clock.wall(), "beat": self.mailbox.beat, "stopping": stopping,
             "messages": self.mailbox.empty(), "readings": readings, "results": self._results, "ordered": self._ordered,
         }  # fmt: skip
-        tick = json.loads(json.dumps(tick))  # what is decided on is what the log will say
+        tick = json.loads(json.dumps(tick, sort_keys=True))  # what is decided on is what the log will say
         decision = self.guard.decide(tick)
         digest = await self._note("tick", {"tick": tick, "decision": decision})
         self._results = await self._order(decision["writes"], decision["releases"])

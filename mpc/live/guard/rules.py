@@ -129,7 +129,7 @@ def rules_of(site: Site) -> GuardRules:
         As read.
     """
     points = {}
-    for name, entry in site.writable.items():
+    for name, entry in sorted(site.writable.items()):  # in the order of the log, which repeats what is decided
         link, actuator = site.file.connections[entry.connection], site.plant.actuators[name]
         ends, release, rate = entry.range, entry.release, entry.rate
         if ends is None or release is None or rate is None:
@@ -140,5 +140,5 @@ def rules_of(site: Site) -> GuardRules:
             actuator.kind or "continuous", actuator.minimum,
         )  # fmt: skip
     kind = POINT_TYPES[ZONE_TEMPERATURE]
-    inputs = {f"{zone}/{ZONE_TEMPERATURE}": (kind.lowest, kind.highest) for zone in site.plant.zones}
+    inputs = {f"{zone}/{ZONE_TEMPERATURE}": (kind.lowest, kind.highest) for zone in sorted(site.plant.zones)}
     return GuardRules(site.hash, Limits(**site.limits()), points, inputs)

@@ -90,11 +90,17 @@ def test_telemetry_tells_what_the_structure_remembers(controller, modes, points)
     controller.observer.start(twin.zone, np.array([276.0]))
     at_rest = np.abs(controller.observer.modal_state - twin.x).max()
     past.iloc[100:110, 3] = np.nan
-    controller.start_up(past)
+    lacked = controller.start_up(past)
+    assert lacked.shape == (2000, len(points.zones)) and list(lacked) == list(points.zones)
     assert np.abs(controller.observer.modal_state - twin.x).max() < 0.15 * at_rest
     np.testing.assert_allclose(controller.observer.disturbance, 0.0, atol=5.0)
     controller.start_up(past.drop(columns=[c for c in past if c.endswith("internal_gain")]))
     np.testing.assert_allclose(controller.observer.disturbance, 30.0, atol=5.0)  # what nobody expected is found
+    flows = [column for column in past if column.endswith("flowrate_sensor")]
+    lost = past.copy()
+    lost.loc[index[1500:1540], flows] = np.nan  # heat that is not on record is not heat that the model lacks
+    apart = np.abs(controller.start_up(lost) - lacked).to_numpy()
+    assert flows and np.abs(lacked.to_numpy()[1490:]).max() < 5.0 and apart[1490:].max() < 5.0
     with pytest.raises(ControlError, match="a time zone"):
         controller.start_up(past.tz_localize(None))
     with pytest.raises(ControlError, match="a zone that reports"):

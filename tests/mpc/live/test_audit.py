@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import gzip
 import json
+import os
+import threading
 import time
 from pathlib import Path
 from typing import Any
@@ -11,7 +13,7 @@ from typing import Any
 import pytest
 
 from mpc.errors import LiveError
-from mpc.live.audit import NOTHING, AuditLog, canonical, log_files, read_log
+from mpc.live.audit import NOTHING, AuditLog, canonical, log_files, log_lines, read_log
 from mpc.live.guard.decide import Guard
 from mpc.live.guard.rules import GuardRules, Limits, PointRule
 from mpc.live.replay import Replay, replay_log, replay_logs
@@ -74,7 +76,7 @@ def test_what_breaks_the_chain_is_named(tmp_path: Path, spoil: Any, line: str) -
 
 def test_a_decision_that_was_forged_with_its_chain_does_not_replay(tmp_path: Path) -> None:
     entries = [e for _, e in read_log(guarded(tmp_path / "a"))]
-    log = AuditLog(tmp_path / "b", "guard")
+    log = AuditLog(tmp_path / "b", "guard", dict)
     for entry in entries:
         if entry["kind"] == "tick" and entry["content"]["decision"]["writes"]:
             entry["content"]["decision"]["writes"][SET] = 291.0
@@ -128,7 +130,7 @@ def test_a_state_that_was_forged_where_a_file_turns_is_told(tmp_path: Path, monk
     log: AuditLog | None = None
     monkeypatch.setattr("mpc.live.audit.LARGEST", 10**9)
     for number, path in enumerate(log_files(tmp_path / "a")):
-        log = AuditLog(tmp_path / "b", "guard")
+        log = AuditLog(tmp_path / "b", "guard", dict)
         for _, entry in read_log(path):
             if number and entry["kind"] == "turned":
                 entry["content"]["state"]["modes"][SET] = "shadow"
@@ -136,6 +138,51 @@ def test_a_state_that_was_forged_where_a_file_turns_is_told(tmp_path: Path, monk
         log.close()
     second = list(replay_logs(log_files(tmp_path / "b")).values())[1]
     assert "line 1: another state than that at the end of the file before" in second.different[0]
+
+
+def test_a_turn_that_fails_is_told_and_one_that_comes_too_late_is_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("mpc.live.audit.LARGEST", 100)
+    log = AuditLog(tmp_path, "guard", dict)
+    (tmp_path / "guard-000001.jsonl").touch()  # there already
+    with pytest.raises(LiveError, match="a folder that can be written to"):
+        log.append("tick", {"text": "x" * 100})
+    log.close()
+    with pytest.raises(LiveError, match="one that is open"):
+        log.append("tick", {})
+    monkeypatch.undo()
+
+    begun, go = threading.Event(), threading.Event()
+    late = AuditLog(tmp_path, "late", dict)
+    fsync = os.fsync
+
+    def hangs(handle: int) -> None:
+        begun.set()
+        go.wait(20.0)
+        fsync(handle)
+
+    monkeypatch.setattr("mpc.live.audit.LARGEST", 100)
+    monkeypatch.setattr("mpc.live.audit.os.fsync", hangs)
+    thread = threading.Thread(target=late.append, args=("tick", {"text": "x" * 100}))
+    thread.start()
+    begun.wait(20.0)
+    late.close()  # which does not wait
+    go.set()
+    thread.join(20.0)
+    assert log_files(tmp_path, "late") == [late.path]
+    with pytest.raises(OSError, match="Bad file descriptor"):
+        os.fstat(late._file)
+
+
+def test_other_files_beside_and_one_that_is_compressed_meanwhile(tmp_path: Path) -> None:
+    path = guarded(tmp_path)
+    (tmp_path / "guard-000000-copy.jsonl").write_bytes(path.read_bytes())
+    assert log_files(tmp_path) == [path] == log_files(tmp_path, "guard")
+    lines = log_lines(path)
+    path.with_name(path.name + ".gz").write_bytes(gzip.compress(path.read_bytes()))
+    path.unlink()
+    assert log_lines(path) == lines
 
 
 def test_only_finite_numbers_of_one_spelling() -> None:

@@ -23,7 +23,7 @@ def inputs(begin: float, zone: float | None) -> dict[str, Any]:
 
 
 def written(folder: Path, *contents: dict[str, Any]) -> AuditLog:
-    log = AuditLog(folder, "controller")
+    log = AuditLog(folder, "controller", dict)
     log.append("start", {})
     for content in contents:
         log.append("plan", {"inputs": content, "plan": {}})
