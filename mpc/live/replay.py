@@ -113,6 +113,8 @@ def replay_log(path: Path, site: Path | None = None, earlier: Replay | None = No
         elif kind == "turned":
             _note_code(found, content)
             _go_on(found, passed, path, at, content)
+            if "controller" in content and site is not None and found.planner is None:
+                found.notes.append(f"plans of {path.name} are repeated together with the files before it only")
         elif kind == "tick" and found.guard is not None:
             _compare(found, path, at, found.guard.decide(content["tick"]), content["decision"])
         elif kind == "start_up" and found.planner is not None:
@@ -130,10 +132,8 @@ def _go_on(found: Replay, passed: Replay, path: Path, at: int, content: dict[str
             found.different.append(f"{path.name}: line {at}: another state than that at the end of the file before")
         found.guard = Guard(GuardRules.from_dict(content["rules"]))
         found.guard.state = GuardState.from_dict(content["state"])
-    elif "controller" in content:
+    else:
         found.planner = passed.planner
-        if passed.planner is None:
-            found.notes.append(f"plans of {path.name} are repeated together with the files before it only")
 
 
 def _note_code(found: Replay, content: dict[str, Any]) -> None:
