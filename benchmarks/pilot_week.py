@@ -4,11 +4,13 @@ The pilot (123 zones, 890 points) is a plant of ours whose parameters are drawn,
 minute behind a real BACnet/IP device; its own control holds 13 degC of supply air and 75 degC of supply water. The
 model is what ``buildingmpc calibrate`` makes of the two weeks before (``--prepare``). From Monday on ``--days`` in
 shadow, in advise, where an operator approves all on the first day at 8, 12 and 16 h, and in act; modes and approvals by
-the command. The same days under its own control are run beside, so that the saving is known. Where a busy machine takes
-long to plan, plans are old by the site's clock: choose a lower rate then.
+the command. The same days under its own control are run beside, so that the saving is known. Days of shadow and advise
+are rehearsed from the first on, those of acting with the others as what came before. Where a busy machine takes long to
+plan, plans are old by the site's clock: choose a lower rate then.
 
 Run: ``python benchmarks/pilot_week.py --work FOLDER --prepare``, then ``python benchmarks/pilot_week.py --work FOLDER
---rate 80 --out results/pilot_week --publish``. Needs ``[live]``, PostgreSQL and ``pip install rusty-bacnet``.
+--rate 80 --out results/pilot_week --publish``; replays and rehearsals take half an hour after the week. Needs
+``[live]``, PostgreSQL and ``pip install rusty-bacnet``.
 """
 
 from __future__ import annotations
@@ -44,6 +46,9 @@ START, APPROVALS = "2023-01-09", (8, 12, 16)
 
 #: Days of telemetry that the model is calibrated on [d].
 BEFORE = 14
+
+#: Least cost of a day of which a share is told [USD].
+_SOME = 0.05
 
 
 def prepare(work: Path, seed: int) -> None:
@@ -207,17 +212,19 @@ def _percent(share: float) -> str:
 def tables(found: Mapping[str, Any]) -> str:
     """Lay out what was found."""
     acted, own, (shadow, advise, _) = found["acted"], found["own"], found["days"]
-    ahead, rows = found["rehearsed"]["all"]["days"], []
-    for k in range(sum(found["days"])):
+    rehearsals, rows = found["rehearsed"], []
+    ahead = [*rehearsals["all"]["days"][: shadow + advise], *rehearsals["acting"]["days"]]
+    for k, told in enumerate(ahead):
         mode = "shadow" if k < shadow else "advise" if k < shadow + advise else "act"
+        saved = 1.0 - acted["cost"][k] / own["cost"][k]
+        shares = [_percent(share) if own["cost"][k] > _SOME and share is not None else "-"
+                  for share in (saved, told["saving"], told["promised"])]  # fmt: skip
         rows.append([
             f"{pd.Timestamp(START) + pd.Timedelta(days=k):%A}", mode, f"{own['cost'][k]:.1f}",
-            f"{acted['cost'][k]:.1f}", _percent(1.0 - acted["cost"][k] / own["cost"][k]),
-            *(_percent(ahead[k][of]) if ahead[k][of] is not None else "-" for of in ("saving", "promised")),
-            f"{own['discomfort'][k]:.1f}, {acted['discomfort'][k]:.1f}",
+            f"{acted['cost'][k]:.1f}", *shares, f"{own['discomfort'][k]:.1f}, {acted['discomfort'][k]:.1f}",
         ])  # fmt: skip
-    heads = ["day", "mode", "own control [USD]", "as operated [USD]", "saved", "rehearsed from the first day on",
-             "promised by plans", "outside the bands, own and operated [K h]"]  # fmt: skip
+    heads = ["day", "mode", "own control [USD]", "as operated [USD]", "saved", "rehearsed", "promised by plans",
+             "outside the bands, own and operated [K h]"]  # fmt: skip
     rehearsed, acting = found["rehearsed"]["acting"]["saving"], slice(shadow + advise, None)
     realised = 1.0 - sum(acted["cost"][acting]) / sum(own["cost"][acting])
     uses, samples = found["parts"], found["samples"]
