@@ -176,12 +176,9 @@ def rehearse(
     whole = _whole_days(times, site)
     expected, found = "a day of the controller's plans with their forecasts", f"{len(times) or 'no'} steps"
     LiveError.unless(whole.size, f"{site.folder}", expected, f"{found}{recorded.reach(site)}", "let it run in shadow")
-    first, day, week = times[0], round(DAY / site.step), round(_WEEK * DAY / site.step)
+    first = times[0]
     steps = round((times[-1] - first) / site.step) + 1
-    taken = np.arange(round((before[0] - first) / site.step) if before else 0, steps)
-    if taken.size < week + steps and week <= steps:
-        taken = np.r_[0:week, 0:steps]
-    taken = np.r_[np.tile(np.resize(taken[:day], day), _FIRST_DAY), taken]
+    taken = _taken(round((first - before[0]) / site.step) if before else 0, steps, site)
     lead = taken.size - steps
     building, system, parameters = believed(site, entry)
     step = MODEL_STEP if site.step % MODEL_STEP == 0.0 else site.step
@@ -222,6 +219,13 @@ def rehearse(
     counted = round(len(whole) * DAY / site.step)
     lost = max(counted - sum(t.normalize() in whole for t in _local(times, site)), 0)
     return Rehearsal(site.file.name, days, _currency(site), counted, lost)
+
+
+def _taken(before: int, steps: int, site: Site) -> NDArray[np.int64]:
+    """List the control steps that are run through, in their order; the first that counts is number 0."""
+    day, week = round(DAY / site.step), round(_WEEK * DAY / site.step)
+    taken = np.r_[0:week, 0:steps] if before < week <= steps else np.arange(-before, steps)
+    return np.asarray(np.r_[np.tile(np.resize(taken[:day], day), _FIRST_DAY), taken], dtype=np.int64)
 
 
 def _local(times: Sequence[float], site: Site) -> pd.DatetimeIndex:
@@ -265,8 +269,8 @@ def _as_recorded(
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Lay out what was forecast for the control steps and what was measured in them, by their ends.
 
-    `taken` are the steps by their number after the first that counts, as they come one after the other. What was not
-    forecast stays as it was the step before, weather that was not measured lies between; of the rest NaN is left.
+    `taken` are the steps, of `_taken`. What was not forecast stays as it was the step before, weather that was not
+    measured lies between; of the rest NaN is left.
     """
     zone, steps, low = site.plant.location.timezone, int(taken[-1]) + 1, int(taken.min())
     end, length = first + steps * site.step, pd.Timedelta(seconds=site.step)
