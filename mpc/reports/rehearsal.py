@@ -90,7 +90,8 @@ def _means(found: Rehearsal) -> Means:
         answer = f"Acting would have {'saved' if found.saving > 0.0 else 'added'} {percent(abs(found.saving))}."
     trust = (
         "Both controls were run by the model that plans are made with, with the heat that it was found to lack in "
-        "these days. On the first day acting also takes what the building's own control had stored."
+        "these days. What walls held before the first day on record is a guess, which makes that day less sure; on it "
+        "acting also takes what the building's own control had stored."
     )
     following = (
         "Rehearse a week of shadow or more; then act on alternate days, and verify them: `buildingmpc verify` holds "
