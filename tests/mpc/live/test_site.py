@@ -14,8 +14,10 @@ import yaml
 
 from mpc.adapters.described.load import load_plant
 from mpc.errors import LiveError, MpcError, PlantError
+from mpc.live.audit import canonical
 from mpc.live.clock import Clock, SimulatedClock, set_clock
 from mpc.live.controller import ControlProcess
+from mpc.live.guard.decide import Guard
 from mpc.live.guard.process import left_before
 from mpc.live.guard.rules import GuardRules, rules_of
 from mpc.live.guard.socket import Mailbox
@@ -74,6 +76,24 @@ def test_a_site_is_read(tmp_path: Path) -> None:
     assert make(tmp_path, plant={"name": "other"}).hash != before != make(tmp_path, {"name": "other"}).hash
     with pytest.raises(PlantError, match="operate site.yaml"):
         load_plant(tmp_path / "plant.yaml")
+
+
+def test_doubts_come_in_one_order_whatever_that_of_the_file(tmp_path: Path) -> None:
+    """A log has its keys in order, and what it repeats must be what was decided."""
+    other = SET.replace("heating", "cooling")  # behind the first in the file, before it in the log
+    actuators = PLANT["actuators"] | {other: PLANT["actuators"][SET] | {"signal": "z"}}
+    points = SITE["points"] | {other: SITE["points"][SET] | {"at": "analog-value,2"}}
+    assert list(points) != sorted(points)
+    (tmp_path / "weather.csv").touch()
+    (tmp_path / "plant.yaml").write_text(yaml.safe_dump(PLANT | {"actuators": actuators}, sort_keys=False))
+    (tmp_path / "site.yaml").write_text(yaml.safe_dump(SITE | {"points": points}, sort_keys=False))
+    rules = rules_of(Site(tmp_path / "site.yaml"))
+    unread = {name: {"value": None, "slots": None, "error": "no answer"} for name in (SET, other)}
+    tick = {"mono": 0.0, "wall": 0.0, "beat": 0.0, "stopping": False, "results": {}, "ordered": None, "messages": [],
+            "readings": unread}  # fmt: skip
+    again = Guard(GuardRules.from_dict(json.loads(canonical(rules.to_dict()))))
+    first, second = Guard(rules).decide(tick), again.decide(json.loads(canonical(tick)))
+    assert len(first["doubts"]) == 2 and canonical(first) == canonical(second)
 
 
 def point(**change: Any) -> dict[str, Any]:
