@@ -153,8 +153,7 @@ class Week:
         while not self.plant.finished:
             self.plant.step({})
         own = self.plant.bought()
-        plans = [entry["content"] for file in log_files(logs, "controller")
-                 for _, entry in read_log(file, None) if entry["kind"] == "plan"]  # fmt: skip
+        plans = list(_contents(logs, "controller", "plan"))
         replays = list(replay_logs(log_files(logs), path).values())
         seconds, site = sum(self.days) * 86400.0, Site(path)
         begin = pd.Timestamp(self.site.first, unit="s", tz="UTC")
@@ -186,18 +185,22 @@ def _counted(words: Any) -> dict[str, int]:
     return found
 
 
+def _contents(logs: Path, process: str, kind: str) -> Iterator[dict[str, Any]]:
+    """Read the events of a kind in a process' logs."""
+    for file in log_files(logs, process):
+        yield from (entry["content"] for _, entry in read_log(file, None) if entry["kind"] == kind)
+
+
 def _doubts(logs: Path) -> dict[str, int]:
     """Doubts of the guard by their first words, in ticks."""
     return _counted(
-        " ".join(doubt.split()[:4]) for file in log_files(logs, "guard") for _, entry in read_log(file, None)
-        if entry["kind"] == "tick" for doubt in entry["content"]["decision"]["doubts"]
-    )  # fmt: skip
+        " ".join(doubt.split()[:4]) for tick in _contents(logs, "guard", "tick") for doubt in tick["decision"]["doubts"]
+    )
 
 
 def _samples(logs: Path) -> dict[str, float]:
     """Count the samples that the collector has read and stored, and the median time between two readings [s]."""
-    reads = [entry["content"] for file in log_files(logs, "collector")
-             for _, entry in read_log(file, None) if entry["kind"] == "read"]  # fmt: skip
+    reads = list(_contents(logs, "collector", "read"))
     return {
         "samples": sum(read["samples"] for read in reads), "readings": len(reads),
         "between": float(np.median(np.diff([read["time"] for read in reads]))),

@@ -157,9 +157,11 @@ def log_files(folder: Path, name: str = "*") -> list[Path]:
     name : str
         Of the process; all by default.
     """
-    plain = {_place(path): path for path in folder.glob(f"{name}-*{_PLAIN}") if _NAMED.fullmatch(path.name)}
-    packed = {_place(path): path for path in folder.glob(f"{name}-*{_PLAIN}.gz") if _NAMED.fullmatch(path.name)}
-    found = packed | plain  # in this order of looking: one that is being compressed is never missed
+    found = dict[tuple[str, int], Path]()
+    for end in (_PLAIN, f"{_PLAIN}.gz"):  # in this order one that is being compressed is never missed
+        for path in folder.glob(f"{name}-*{end}"):
+            if _NAMED.fullmatch(path.name):
+                found.setdefault(_place(path), path)
     return [found[place] for place in sorted(found)]
 
 

@@ -127,8 +127,7 @@ def replay_log(path: Path, site: Path | None = None, earlier: Replay | None = No
 def _go_on(found: Replay, passed: Replay, path: Path, at: int, content: dict[str, Any]) -> None:
     """Take over what the file before ended with; a guard tells its state anew."""
     if "state" in content:
-        known = content["state"] if passed.guard is None else passed.guard.state.to_dict()
-        if canonical(known) != canonical(content["state"]):
+        if passed.guard is not None and canonical(passed.guard.state.to_dict()) != canonical(content["state"]):
             found.different.append(f"{path.name}: line {at}: another state than that at the end of the file before")
         found.guard = Guard(GuardRules.from_dict(content["rules"]))
         found.guard.state = GuardState.from_dict(content["state"])

@@ -203,9 +203,11 @@ def left_before(site: Site) -> tuple[dict[str, str], dict[str, float]]:
         As read.
     """
     for path in reversed(log_files(site.folder, "guard")):
-        start, last, lines = None, None, list[bytes]()
-        with contextlib.suppress(LiveError):  # a damaged one tells nothing
+        start, last = None, None
+        try:
             lines = log_lines(path)
+        except LiveError:
+            continue
         for line in lines:
             with contextlib.suppress(ValueError, TypeError, KeyError):
                 entry = json.loads(line)
