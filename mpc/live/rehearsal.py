@@ -51,8 +51,8 @@ _WEEK, _FIRST_DAY = 7, 3
 #: Least share of a day's steps that must be on record for it to count [-]; what is missing stays as it was before.
 _ON_RECORD = 0.9
 
-#: Seed of the sensors' noise.
-_SEED = 0
+#: Seed of the sensors' noise; share of the dearest day's cost below which a day costs nothing [-].
+_SEED, _ROUND_OFF = 0, 1e-6
 
 
 @dataclass(frozen=True, repr=False)
@@ -93,9 +93,9 @@ class Rehearsal(Result):
         return float((known["own_cost"] * known["promised"]).sum() / weight) if weight > 0.0 else math.nan
 
     def to_frame(self) -> pd.DataFrame:
-        """Tabulate the days, as `days` with ``saving`` [-]."""
+        """Tabulate the days, as `days` with ``saving`` [-], NaN where own control costs nothing."""
         own = self.days["own_cost"]
-        return self.days.assign(saving=1.0 - self.days["cost"] / own.where(own > 0.0))
+        return self.days.assign(saving=1.0 - self.days["cost"] / own.where(own > _ROUND_OFF * own.max()))
 
     def to_dict(self) -> dict[str, Any]:
         """Contents of ``rehearsal.json``."""

@@ -94,8 +94,8 @@ def _means(found: Rehearsal) -> Means:
         "acting also takes what the building's own control had stored."
     )
     following = (
-        "Rehearse a week of shadow or more; then act on alternate days, and verify them: `buildingmpc verify` holds "
-        "these days (`--rehearsed days.parquet`) against what is metered."
+        "Rehearse a week of shadow or more; then act on alternate days, and verify them: buildingmpc verify holds "
+        "these days (--rehearsed days.parquet) against what is metered."
     )
     return Means(answer, trust, following)
 

@@ -109,6 +109,7 @@ def test_a_monday_makes_up_for_the_weekend(office_site: Callable[[float], Any]) 
     assert (list(days.days.index), days.steps, days.lost) == ([monday + pd.Timedelta(days=1)], 96, 0)  # the whole one
     alone = rehearse(site, end=monday + pd.Timedelta(days=1), controller=idle)
     assert len(alone.days) == 1
+    assert np.isnan(week.to_frame()["saving"].iloc[5:]).all()  # a weekend costs nothing but round-off
     friday = rehearse(site, monday + pd.Timedelta(days=4), monday + pd.Timedelta(days=5), controller=idle)
     assert (friday.steps, friday.lost) == (96, 0)  # four days, which were recorded before, are behind it
     assert friday.days["own_energy"].iloc[0] == pytest.approx(week.days["own_energy"].iloc[4], rel=0.05)
