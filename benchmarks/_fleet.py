@@ -33,7 +33,9 @@ def population_centre(names: list[str]) -> dict[str, float]:
     return {n: APART * np.random.default_rng([_CENTRE, *n.encode()]).choice([-1.0, 1.0]) for n in names}
 
 
-def make_office(folder: Path, seed: int, days: float = 7.0, step_seconds: float = 1800.0) -> dict[str, float]:
+def make_office(
+    folder: Path, seed: int, days: float = 7.0, step_seconds: float = 1800.0, spread: float = SPREAD
+) -> dict[str, float]:
     """Save an office of 80 m2 and 2 zones with its telemetry; return its true parameters."""
     plans = generate_office(seed, floor_area=80.0, zones=2, floors=1, cell_size=CELL)
     building = Building(folder.name, MOUNTAIN_VIEW, 0.0, plans, devices(plans))
@@ -42,7 +44,7 @@ def make_office(folder: Path, seed: int, days: float = 7.0, step_seconds: float 
     rng = np.random.default_rng([_CENTRE, seed])
     truth = {}
     for p in parameters:
-        z = p.transform(p.start) + p.prior_deviation * (centre[p.name] + SPREAD * rng.standard_normal())
+        z = p.transform(p.start) + p.prior_deviation * (centre[p.name] + spread * rng.standard_normal())
         truth[p.name] = float(np.clip(p.inverse(z), p.lower, p.upper))
     settings = TwinSettings(days=days, spin_up_days=3.0, step_seconds=step_seconds, fixed=truth)
     case, _ = generate_twin(building, seed, settings)
