@@ -88,9 +88,33 @@ def climb(drawn: FittedCase, began: float, progress: Progress | None = None) -> 
     return replace(result, rungs=rungs, uncalibrated=drawn.uncalibrated(whole.part(1.0)))
 
 
+@dataclass(frozen=True)
+class Heated:
+    """A building as drawn with what it is best taken to give its heat by, beside a lumped model.
+
+    Parameters
+    ----------
+    fit : FittedCase
+        With heated floors or radiators.
+    left_out_mae : float
+        Its error on left-out days [K].
+    lumped : float
+        That of a lumped model with all heat in the air [K].
+    """
+
+    fit: FittedCase
+    left_out_mae: float
+    lumped: float
+
+    @property
+    def wrong(self) -> bool:
+        """Whether the lumped model does better: a drawing that is wrong altogether is better with anything slow."""
+        return self.lumped < (1.0 - ADVANCE) * self.left_out_mae
+
+
 def fit_emitter(
     fitted: Fitted, given: Tuned, known: Mapping[str, Sequence[str]], progress: Progress | None = None
-) -> FittedCase | None:
+) -> Heated | None:
     """Fit a building as drawn with what it is best taken to give its heat by, where the case does not say it.
 
     Parameters
@@ -106,8 +130,8 @@ def fit_emitter(
 
     Returns
     -------
-    FittedCase or None
-        With heated floors or radiators; None where all of the heat had better be in the air.
+    Heated or None
+        None where all of the heat had better be in the air.
     """
     ladder = _Ladder(given, Forward(progress), replace(given.calibration, starts=1, effects=known))
     if is_large(given.case.building.zone_names) or not ladder.guesses:
@@ -117,11 +141,9 @@ def fit_emitter(
     best = looked[_best(looked, ADVANCE)]
     if best.fit is None:
         return None
-    # a drawing that is wrong altogether is better with anything slow
     source = telemetry_inputs(given.case)
     lumped = ladder.solve(replace(ladder.base, structure=Structure(lumped=True, sun=source.gives("sun"))))
-    wrong = ladder.look("lumped", lumped.best).left.mae < (1.0 - ADVANCE) * best.left.mae
-    return None if wrong else best.fit
+    return Heated(best.fit, best.left.mae, ladder.look("lumped", lumped.best).left.mae)
 
 
 class Tuned(Protocol):

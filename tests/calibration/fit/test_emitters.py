@@ -12,6 +12,7 @@ import pytest
 from calibration.diagnosis.baseline import fit_baseline
 from calibration.diagnosis.refit.comparison import ModelComparison
 from calibration.diagnosis.refit.refit import held_out
+from calibration.diagnosis.seek import seek
 from calibration.fit.calibrate import calibrate
 from calibration.fit.result import CalibrationResult
 from mpc.reports.calibration import calibration_verdict
@@ -54,8 +55,11 @@ def house(*emitters: str | None) -> Building:
     return Building("twin", SITE, 0.0, table, devices=heaters)
 
 
-def twin(*emitters: str | None, days: int = 6) -> Case:
-    """Telemetry of a house with these emitters, by half hours, and a case that says nothing of them."""
+def twin(*emitters: str | None, days: int = 6, leaks: float = 0.0) -> Case:
+    """Telemetry of a house with these emitters, by half hours, and a case that says nothing of them.
+
+    Each room may leak besides, air of this conductance to outdoor [W/K].
+    """
     rng, truth = np.random.default_rng(3), build_network(house(*emitters))
     m = SymbolicModel(truth).matrices(truth.start())
     stamps = pd.date_range("2024-01-01 00:30", periods=48 * days, freq="30min", tz="Etc/GMT-1", name="timestamp")
@@ -65,7 +69,8 @@ def twin(*emitters: str | None, days: int = 6) -> Case:
     stepper, state, zone = Stepper(m, 1800.0, IMPLICIT_EULER), 18.0 * m.uniform[:, None], []
     for k in range(stamps.size):
         outside = np.array([outdoor[k], *(heat[k, ZONES.index(s.name.rpartition(" ")[2])] for s in truth.signals)])
-        state, mean, _, _ = stepper.advance(state, outside[:, None], heat[k][:, None], np.zeros((0, 1)))
+        lost = leaks * (zone[-1] - outdoor[k]) if zone else 0.0
+        state, mean, _, _ = stepper.advance(state, outside[:, None], (heat[k] - lost)[:, None], np.zeros((0, 1)))
         zone.append(mean[:, 0] + rng.normal(0.0, 0.03, 2))
     frame = pd.DataFrame({f"weather_station/{OUTDOOR_TEMPERATURE}": outdoor + 273.15}, index=stamps)
     for i, name in enumerate(ZONES):
@@ -94,9 +99,27 @@ def test_a_heated_floor_is_found_and_where_it_is() -> None:
 
 
 def test_the_baseline_of_a_diagnosis_knows_rooms_with_radiators_from_those_with_heated_floors() -> None:
-    models, fit = fit_baseline(ModelComparison(twin("floor", "radiator")), {})
+    baseline = fit_baseline(ModelComparison(twin("floor", "radiator")), {})
+    models, fit = baseline.models, baseline.fit
     assert fit.values["floor_heat_share@below"] > 0.9 > 0.3 > fit.values["floor_heat_share@above"]
     assert held_out(models, fit).mae < 0.2
+
+
+def test_heated_floors_stay_in_doubt_until_what_is_missing_is_found() -> None:
+    baseline = fit_baseline(ModelComparison(twin("floor", "floor", leaks=25.0)), {})
+    assert baseline.models.settings.structure.emitter == "air"  # a lumped model makes up for the leaks
+    assert (doubted := baseline.doubted) is not None
+    assert doubted.models.settings.structure.emitter == "floor" and not doubted.stands(doubted.fit)
+    found = doubted.models.fit({"infiltration": ()}, [doubted.fit.values])
+    assert doubted.stands(found)
+    assert held_out(doubted.models, found).mae < 0.2 * doubted.lumped
+
+
+@pytest.mark.long
+def test_leaks_of_a_house_with_heated_floors_are_found() -> None:
+    found = seek(twin("floor", "floor", days=14, leaks=40.0))
+    assert found.models.settings.structure.emitter == "floor"
+    assert found.verdict.name == "group" and set(found.verdict.candidates[0].group) == {"infiltration", "thermal_bridge"}
 
 
 def test_radiators_are_no_floors() -> None:
