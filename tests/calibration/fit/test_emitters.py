@@ -108,7 +108,8 @@ def test_the_baseline_of_a_diagnosis_knows_rooms_with_radiators_from_those_with_
 def test_heated_floors_stay_in_doubt_until_what_is_missing_is_found() -> None:
     baseline = fit_baseline(ModelComparison(twin("floor", "floor", leaks=25.0)), {})
     assert baseline.models.settings.structure.emitter == "air"  # a lumped model makes up for the leaks
-    assert (doubted := baseline.doubted) is not None
+    doubted = baseline.doubted
+    assert doubted is not None
     assert doubted.models.settings.structure.emitter == "floor" and not doubted.stands(doubted.fit)
     found = doubted.models.fit({"infiltration": ()}, [doubted.fit.values])
     assert doubted.stands(found)
