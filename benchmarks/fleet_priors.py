@@ -11,12 +11,12 @@ the default, and with innovations.
 The centre of the population lies 0.8 of the priors' deviations off the drawing, and its spread is 0.25 (``--spread``):
 the gain is that of such a fleet, and is smaller where buildings are less alike; the line of the true population as
 prior (what an endless fleet would teach) bounds it. How far true parameters are from the estimate of 3 days with that
-prior, in deviations of its posterior, says whether anything was left in the data. Buildings come from the model that is
+prior, in deviations of its posterior, says whether that posterior is right. Buildings come from the model that is
 fitted: nothing here is said of missing physics.
 
 Run: ``python benchmarks/fleet_priors.py --out results/priors [--train 1000 --test 100] [--workers 2] [--publish]``,
 and with ``--spread 0.1 --table fleet_priors_alike`` for buildings that are more alike. Writes ``TABLE.json`` and
-``.md``; the training fleet stays in ``train``, and a rerun does what is missing of it.
+``.md``; the training fleet stays in ``train_SPREAD``, and a rerun does what is missing of it.
 """
 
 from __future__ import annotations
@@ -40,7 +40,6 @@ from calibration.evaluation.population import Population
 from calibration.fit.told import Told
 from calibration.fleet.data_set import LocalFolder
 from calibration.fleet.priors import population_of
-from calibration.fleet.run import case_folders
 from thermal.case.case import Case
 from thermal.case.load import load_case
 from thermal.network.build import build_network
@@ -71,12 +70,12 @@ def shortened(case: Case, since: pd.Timestamp) -> Case:
 
 def train(folder: Path, count: int, workers: int, spread: float) -> tuple[Population, int]:
     """Calibrate the training fleet and learn its population; also how many did not make it."""
-    cases = folder / "cases"
-    for seed in range(count):
-        if not (office := cases / f"office_{seed:05d}").exists():
+    offices = [folder / "cases" / f"office_{seed:05d}" for seed in range(count)]
+    for seed, office in enumerate(offices):
+        if not office.exists():
             make_office(office, seed, LONG + HELD_OUT, spread=spread)
     results = folder / "results"
-    found = calibrate_many(case_folders(cases), results, SETTINGS | {"objective": "innovations"}, workers=workers)
+    found = calibrate_many(offices, results, SETTINGS | {"objective": "innovations"}, workers=workers)
     return population_of(LocalFolder(results)), sum(o.status != "calibrated" for o in found)
 
 
@@ -163,7 +162,8 @@ def main() -> None:
     options = parser.parse_args()
     load, judged = os.getloadavg()[0], list[dict[str, Any]]()
     with tempfile.TemporaryDirectory() as folder:
-        learned, failed = train(options.out / "train", options.train, options.workers, options.spread)
+        training = options.out / f"train_{options.spread:g}"
+        learned, failed = train(training, options.train, options.workers, options.spread)
         began = sum(os.times()[:4])  # with processes that have ended
         with ProcessPoolExecutor(options.workers, get_context("spawn")) as pool:
             seeds = range(FIRST_TEST, FIRST_TEST + options.test)
@@ -180,10 +180,10 @@ def main() -> None:
     usual = "14 days, multi_step, none"
     of_fleet, of_truth = (ratio_of_medians(judged, f"3 days, innovations, {p}", usual) for p in ("fleet", "truth"))
     note = (
-        f"{options.train} buildings to learn from ({failed} calibrations without convergence), {options.test} others "
-        f"to judge on, spread {options.spread:g}; MAE 6 h ahead on the same 7 days. {seconds:.0f} s of CPU for the "
-        "tests. Medians of 3 days by innovations over that of 14 days by errors without priors (90 % by bootstrap over "
-        f"buildings): {of_fleet} with the fleet's priors, {of_truth} with the true population; from this last estimate "
+        f"{len(learned.members)} buildings to learn from ({failed} calibrations without convergence), {options.test} "
+        f"others to judge on, spread {options.spread:g}; MAE 6 h ahead on the same 7 days. {seconds:.0f} s of CPU for "
+        "the tests. Medians of 3 days by innovations over that of 14 days by errors without priors (90 % by bootstrap "
+        f"over buildings): {of_fleet} with the fleet's priors, {of_truth} with the true population; from this last estimate "
         f"the true parameters are a squared distance of {np.mean([j['distance'] for j in judged]):.2f} away (1 where "
         "the posterior is right).\n"
     )

@@ -367,5 +367,4 @@ def baseline_gap(
     CalibrationError
         When an interval has no usable run.
     """
-    baseline = fit_baseline(ModelComparison(case, ModelSettings(dx=dx), tune, hold_out, horizon), {})
-    return float(held_out(baseline.models, baseline.fit).mae)
+    return float(held_out(*fit_baseline(ModelComparison(case, ModelSettings(dx=dx), tune, hold_out, horizon), {})).mae)

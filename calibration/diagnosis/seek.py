@@ -7,14 +7,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
-from calibration.diagnosis.baseline import Baseline, fit_baseline
+from calibration.diagnosis.baseline import fit_baseline
 from calibration.diagnosis.decide.verdict import Verdict, doubted, gains_of, judge, summarised
 from calibration.diagnosis.faults import Fault, mend, with_faults
 from calibration.diagnosis.free import Free, drawing_fails, held_against, search_free, with_recurring
 from calibration.diagnosis.handed_on import other_structures
 from calibration.diagnosis.known import reasons_of
 from calibration.diagnosis.refit.challenge import challenge
-from calibration.diagnosis.refit.comparison import ModelComparison
+from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.diagnosis.refit.how_far import Step, how_far
 from calibration.diagnosis.refit.refit import HeldOut, elsewhere, held_out
 from calibration.diagnosis.refit.search import Round, search
@@ -180,9 +180,9 @@ def seek(
     untestable |= reasons_of(known, ruled_out, untestable)
     whole.say("baseline")
     begun = stage("baseline", lambda: _begin(drawn, {name: () for name in known}, whole))
-    baseline, errors, last_third = begun
+    models, baseline, errors, last_third = begun
     testable = [e for e in CATALOGUE if e not in untestable]
-    models, rounds = _sought_about(baseline, errors, testable, whole)
+    rounds = search(models, baseline, errors, testable, whole.part(0.5))
     models, rounds = stage(
         "masses by zone", lambda: challenge(models, rounds, testable, whole.part(0.3, "masses by zone"))
     )
@@ -202,29 +202,17 @@ def seek(
 
 def _begin(
     drawn: ModelComparison, effects: dict[str, tuple[str, ...]], whole: Forward
-) -> tuple[Baseline, HeldOut, float | None]:
+) -> tuple[ModelComparison, Fit, HeldOut, float | None]:
     """Fit the baseline, on days that alternate where the last third is another world; also what it erred by there."""
-    baseline = fit_baseline(drawn, effects, whole.part(0.2, "baseline"))
-    models, first = baseline.models, held_out(baseline.models, baseline.fit)
-    errors, turns = first, elsewhere(baseline.fit, first) and models.alternate(baseline.fit.built.inputs)
+    models, baseline = fit_baseline(drawn, effects, whole.part(0.2, "baseline"))
+    first = errors = held_out(models, baseline)
+    turns = elsewhere(baseline, first) and models.alternate(baseline.built.inputs)
     if turns:
         # what heaters give their heat by is chosen by days that tune, and these are others now
         other_days = replace(drawn, tune=models.tuned, hold_out=models.judged)
-        baseline = fit_baseline(other_days, effects, whole.part(0.2, "baseline"))
-        errors = held_out(baseline.models, baseline.fit)
-    return baseline, errors, first.mae if turns else None
-
-
-def _sought_about(
-    baseline: Baseline, errors: HeldOut, testable: Sequence[str], whole: Forward
-) -> tuple[ModelComparison, tuple[Round, ...]]:
-    """Seek effects about a baseline; first about one in doubt, which stays where it stands with what is found."""
-    if (doubted := baseline.doubted) is not None:
-        before = held_out(doubted.models, doubted.fit)
-        rounds = search(doubted.models, doubted.fit, before, testable, whole.part(0.3, "heated floors"))
-        if doubted.stands(rounds[-1].after):
-            return doubted.models, rounds
-    return baseline.models, search(baseline.models, baseline.fit, errors, testable, whole.part(0.5))
+        models, baseline = fit_baseline(other_days, effects, whole.part(0.2, "baseline"))
+        errors = held_out(models, baseline)
+    return models, baseline, errors, first.mae if turns else None
 
 
 class _About(NamedTuple):

@@ -88,33 +88,9 @@ def climb(drawn: FittedCase, began: float, progress: Progress | None = None) -> 
     return replace(result, rungs=rungs, uncalibrated=drawn.uncalibrated(whole.part(1.0)))
 
 
-@dataclass(frozen=True)
-class Heated:
-    """A building as drawn with what it is best taken to give its heat by, beside a lumped model.
-
-    Parameters
-    ----------
-    fit : FittedCase
-        With heated floors or radiators.
-    left_out_mae : float
-        Its error on left-out days [K].
-    lumped : float
-        That of a lumped model with all heat in the air [K].
-    """
-
-    fit: FittedCase
-    left_out_mae: float
-    lumped: float
-
-    @property
-    def wrong(self) -> bool:
-        """Whether the lumped model does better: a drawing that is wrong altogether is better with anything slow."""
-        return self.lumped < (1.0 - ADVANCE) * self.left_out_mae
-
-
 def fit_emitter(
     fitted: Fitted, given: Tuned, known: Mapping[str, Sequence[str]], progress: Progress | None = None
-) -> Heated | None:
+) -> FittedCase | None:
     """Fit a building as drawn with what it is best taken to give its heat by, where the case does not say it.
 
     Parameters
@@ -130,20 +106,15 @@ def fit_emitter(
 
     Returns
     -------
-    Heated or None
-        None where all of the heat had better be in the air.
+    FittedCase or None
+        With heated floors or radiators; None where all of the heat had better be in the air.
     """
     ladder = _Ladder(given, Forward(progress), replace(given.calibration, starts=1, effects=known))
     if is_large(given.case.building.zone_names) or not ladder.guesses:
         return None
     looked = [ladder.look("drawn", fitted)]
     looked += ladder.emitters(fitted, looked[0].left.mae)
-    best = looked[_best(looked, ADVANCE)]
-    if best.fit is None:
-        return None
-    source = telemetry_inputs(given.case)
-    lumped = ladder.solve(replace(ladder.base, structure=Structure(lumped=True, sun=source.gives("sun"))))
-    return Heated(best.fit, best.left.mae, ladder.look("lumped", lumped.best).left.mae)
+    return looked[_best(looked, ADVANCE)].fit
 
 
 class Tuned(Protocol):
@@ -208,8 +179,7 @@ def climb_from(
         best = _best(looked, advance)
         if (found := looked[best].fit) is not None:
             base, fitted = found.settings, found.best
-    structure = Structure(lumped=True, sun=source.gives("sun"), emitter=ladder.base.structure.emitter)
-    free = ladder.lumped(structure, looked[best].left.mae)
+    free = ladder.lumped(Structure(lumped=True, sun=source.gives("sun")), looked[best].left.mae)
     drawn = free[0].left.mae >= _WRONG * looked[best].left.mae
     if plain and drawn and source.gives("wind"):
         follows = replace(base, structure=replace(base.structure, wind_films=True))
@@ -289,10 +259,14 @@ class _Ladder:
         return stage("structure", solved)
 
     @property
-    def guesses(self) -> bool:
+    def unsaid(self) -> bool:
         """Whether there are plain heaters of which nobody says what they give their heat by."""
-        case = self.given.case
-        return self.base.structure.emitter == "air" and bool(unknown_heaters(case.building, case.telemetry.frame))
+        return bool(unknown_heaters(self.given.case.building, self.given.case.telemetry.frame))
+
+    @property
+    def guesses(self) -> bool:
+        """Whether the structures that are looked at may differ in that."""
+        return self.base.structure.emitter == "air" and self.unsaid
 
     def tried(self, name: str, settings: CalibrationSettings, known: Fitted, least: float, error: float) -> _Looked:
         """Look at a structure as it begins, and fit it where that promises to be better by a share.
@@ -323,7 +297,7 @@ class _Ladder:
         """Fit a lumped model, and another with heated floors if they promise anything and no drawing is as good."""
         found = self.solve(replace(self.base, structure=structure))
         looked = [self.look("lumped", found.best, found)]
-        if self.guesses and looked[0].left.mae < error:
+        if self.unsaid and looked[0].left.mae < error:
             floors = replace(found.settings, structure=replace(structure, emitter="floor"))
             looked.append(self.tried("lumped floor", floors, found.best, _PROMISED, looked[0].left.mae))
         return [each for each in looked if each.fit is not None]

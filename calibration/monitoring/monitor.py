@@ -235,8 +235,7 @@ def monitor(
         effects = {name: tuple(zones) for name, zones in dict(given.effects).items()}
     else:
         known = chosen.known if chosen.known is not None else [e for e in USUAL if e not in untestable]
-        baseline = fit_baseline(models, {name: () for name in known})
-        models, fit = baseline.models, baseline.fit
+        models, fit = fit_baseline(models, {name: () for name in known})
         models.drivers = drivers
         values, effects = fit.values, dict(fit.effects)
     # what is in the model is watched like all else

@@ -42,8 +42,7 @@ def office() -> Case:
 @cache
 def round_of() -> Round:
     """What a search for two effects begins with."""
-    begun = fit_baseline(ModelComparison(office(), ModelSettings(dx=1.0)), {})
-    models, baseline = begun.models, begun.fit
+    models, baseline = fit_baseline(ModelComparison(office(), ModelSettings(dx=1.0)), {})
     return search(models, baseline, held_out(models, baseline), [SUN, AIR])[0]
 
 

@@ -99,21 +99,16 @@ def test_a_heated_floor_is_found_and_where_it_is() -> None:
 
 
 def test_the_baseline_of_a_diagnosis_knows_rooms_with_radiators_from_those_with_heated_floors() -> None:
-    baseline = fit_baseline(ModelComparison(twin("floor", "radiator")), {})
-    models, fit = baseline.models, baseline.fit
+    models, fit = fit_baseline(ModelComparison(twin("floor", "radiator")), {})
     assert fit.values["floor_heat_share@below"] > 0.9 > 0.3 > fit.values["floor_heat_share@above"]
     assert held_out(models, fit).mae < 0.2
 
 
-def test_heated_floors_stay_in_doubt_until_what_is_missing_is_found() -> None:
-    baseline = fit_baseline(ModelComparison(twin("floor", "floor", leaks=25.0)), {})
-    assert baseline.models.settings.structure.emitter == "air"  # a lumped model makes up for the leaks
-    doubted = baseline.doubted
-    assert doubted is not None
-    assert doubted.models.settings.structure.emitter == "floor" and not doubted.stands(doubted.fit)
-    found = doubted.models.fit({"infiltration": ()}, [doubted.fit.values])
-    assert doubted.stands(found)
-    assert held_out(doubted.models, found).mae < 0.2 * doubted.lumped
+def test_heated_floors_are_found_though_a_lumped_model_makes_up_for_leaks() -> None:
+    models, fit = fit_baseline(ModelComparison(twin("floor", "floor", leaks=25.0)), {})
+    assert models.settings.structure.emitter == "floor"
+    found = models.fit({"infiltration": ()}, [fit.values])
+    assert held_out(models, found).mae < 0.2 * held_out(models, fit).mae
 
 
 @pytest.mark.long
