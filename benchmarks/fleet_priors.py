@@ -183,9 +183,9 @@ def main() -> None:
         f"{len(learned.members)} buildings to learn from ({failed} calibrations without convergence), {options.test} "
         f"others to judge on, spread {options.spread:g}; MAE 6 h ahead on the same 7 days. {seconds:.0f} s of CPU for "
         "the tests. Medians of 3 days by innovations over that of 14 days by errors without priors (90 % by bootstrap "
-        f"over buildings): {of_fleet} with the fleet's priors, {of_truth} with the true population; from this last estimate "
-        f"the true parameters are a squared distance of {np.mean([j['distance'] for j in judged]):.2f} away (1 where "
-        "the posterior is right).\n"
+        f"over buildings): {of_fleet} with the fleet's priors, {of_truth} with the true population; from this last "
+        f"estimate the true parameters are a squared distance of {np.mean([j['distance'] for j in judged]):.2f} away "
+        "(1 where the posterior is right).\n"
     )
     data = {"judged": judged, "population": learned.to_dict(), "failed": failed, "load": load}
     write(options.out, options.table, f"{table}\n{note}", data, options.publish)
