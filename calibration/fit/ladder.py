@@ -180,7 +180,7 @@ def climb_from(
         if (found := looked[best].fit) is not None:
             base, fitted = found.settings, found.best
     free = ladder.lumped(Structure(lumped=True, sun=source.gives("sun")), looked[best].left.mae)
-    drawn = free[0].left.mae >= _WRONG * looked[best].left.mae
+    drawn = min(each.left.mae for each in free) >= _WRONG * looked[best].left.mae
     if plain and drawn and source.gives("wind"):
         follows = replace(base, structure=replace(base.structure, wind_films=True))
         wind = _begun(given, follows, fitted)
@@ -259,14 +259,10 @@ class _Ladder:
         return stage("structure", solved)
 
     @property
-    def unsaid(self) -> bool:
-        """Whether there are plain heaters of which nobody says what they give their heat by."""
-        return bool(unknown_heaters(self.given.case.building, self.given.case.telemetry.frame))
-
-    @property
     def guesses(self) -> bool:
-        """Whether the structures that are looked at may differ in that."""
-        return self.base.structure.emitter == "air" and self.unsaid
+        """Whether there are plain heaters of which nobody says what they give their heat by."""
+        case = self.given.case
+        return self.base.structure.emitter == "air" and bool(unknown_heaters(case.building, case.telemetry.frame))
 
     def tried(self, name: str, settings: CalibrationSettings, known: Fitted, least: float, error: float) -> _Looked:
         """Look at a structure as it begins, and fit it where that promises to be better by a share.
@@ -294,11 +290,18 @@ class _Ladder:
         return [self.look("radiator", simpler.best, simpler), seen]
 
     def lumped(self, structure: Structure, error: float) -> list[_Looked]:
-        """Fit a lumped model, and another with heated floors if they promise anything and no drawing is as good."""
-        found = self.solve(replace(self.base, structure=structure))
+        """Fit a lumped model, and one with heated floors if the drawing has them, or if they promise anything.
+
+        In the latter case only where no drawing is as good as the former.
+        """
+        own = self.base.structure.emitter
+        found = self.solve(replace(self.base, structure=replace(structure, emitter="air" if own == "floor" else own)))
         looked = [self.look("lumped", found.best, found)]
-        if self.unsaid and looked[0].left.mae < error:
-            floors = replace(found.settings, structure=replace(structure, emitter="floor"))
+        floors = replace(found.settings, structure=replace(structure, emitter="floor"))
+        if own == "floor":
+            heated = self.solve(floors)
+            looked.append(self.look("lumped floor", heated.best, heated))
+        elif self.guesses and looked[0].left.mae < error:
             looked.append(self.tried("lumped floor", floors, found.best, _PROMISED, looked[0].left.mae))
         return [each for each in looked if each.fit is not None]
 
