@@ -31,7 +31,7 @@ class Levels:
     concentrated: float = 3.5
     explained: float = 0.4
     explained_of_much: float = 0.6
-    generic: float = 8.0
+    generic: float = 16.0
 
 
 #: Those that hold.
