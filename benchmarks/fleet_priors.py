@@ -90,10 +90,10 @@ def true_population(learned: Population, prior: dict[str, float], spread: float)
 def squared_distance(told: Told, prior: Population, case: Case, truth: dict[str, float]) -> float:
     """Squared distance of the true parameters from an estimate, by its posterior's covariance, a parameter [-]."""
     parameters = {p.name: p for p in build_network(case.building).parameters}
-    at = [prior.names.index(parameters[name].base) for name in told.names]
-    true = [parameters[n].transform(truth[n]) - parameters[n].transform(parameters[n].start) for n in told.names]
-    off = told.point - np.array(true)
-    return float(off @ (told.information + np.linalg.inv(prior.covariance[np.ix_(at, at)])) @ off / len(off))
+    estimated = [parameters[name] for name in told.names]
+    off = told.point - np.array([p.transform(truth[p.name]) - p.transform(p.start) for p in estimated])
+    _, _, covariance = prior.prior(estimated, told.own_deviation)
+    return float(off @ (told.information + np.linalg.inv(covariance)) @ off / len(off))
 
 
 def judge(folder: Path, seed: int, learned: Population, spread: float) -> dict[str, Any]:
@@ -108,9 +108,10 @@ def judge(folder: Path, seed: int, learned: Population, spread: float) -> dict[s
         first = calibrate(case, [cut["long"]], [cut["held_out"]], settings=settings)
         deviations = {p.base: p.prior_deviation for p in first.information.estimated}
         errors["drawn"] = first.uncalibrated["held_out"].metrics.mae
+        true = true_population(learned, deviations, spread)
         found = {f"14 days, {objective}, none": first}
         for days, on, tuned in (("3 days", three, cut["short"]), ("14 days", case, cut["long"])):
-            priors = {"none": None, "fleet": learned, "truth": true_population(learned, deviations, spread)}
+            priors = {"none": None, "fleet": learned, "truth": true}
             for name, given in priors.items():
                 key = f"{days}, {objective}, {name}"
                 if key not in found and not (days == "14 days" and name == "truth"):
@@ -118,7 +119,6 @@ def judge(folder: Path, seed: int, learned: Population, spread: float) -> dict[s
                     found[key] = calibrate(on, [tuned], [cut["held_out"]], settings=more)
         errors |= {key: result.calibrated["held_out"].metrics.mae for key, result in found.items()}
     last = found["3 days, innovations, truth"]  # of which the likelihood, and so the posterior, is the plant's own
-    true = true_population(learned, deviations, spread)
     return errors | {"distance": squared_distance(last.told, true, case, truth)}
 
 

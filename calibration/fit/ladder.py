@@ -146,8 +146,8 @@ def climb_from(
     films that follow the wind, and with slabs and furniture by zone, unless a lumped model halves the drawing's error;
     lumped, where the sun is a part of it, by an estimate if irradiance is not measured; lumped, with a gain that recurs
     from day to day, which is linear, so that a few Newton steps from the lumped estimate tell whether it is worth a
-    fit; lumped with floors that are heated, where that alone is better than any drawing; and where one of these is
-    kept, with heat and weather moved in time.
+    fit; lumped with floors that are heated, where the drawing has them or lumped alone is better than any drawing; and
+    where one of these is kept, with heat and weather moved in time.
 
     Parameters
     ----------
