@@ -75,6 +75,11 @@ class Fault:
         """That it is there [-]."""
         return _PROBABILITY[self.seen.certainty]
 
+    @property
+    def is_certain(self) -> bool:
+        """Whether no model is needed to see it."""
+        return self.seen.certainty == "certain"
+
     def to_dict(self) -> dict[str, Any]:
         """Entry of ``faults`` in ``diagnosis.json``."""
         return {
@@ -154,13 +159,14 @@ def mend(
 
     while True:
         here = found[-1].mended if found else case
-        fault = next((f for f in suspected(here) if (f.effect, f.zones) not in tried), None)
+        left = [f for f in suspected(here) if (f.effect, f.zones) not in tried]
+        fault = min(left, key=lambda f: not f.is_certain, default=None)  # what is certain first
         if fault is None:
             return tuple(found)
         tried.add((fault.effect, fault.zones))
         error = error or errors(here)
         without = errors(fault.mended)
-        if fault.seen.certainty == "certain" or without.left_out < (1.0 - LEAST) * error.left_out:
+        if fault.is_certain or without.left_out < (1.0 - LEAST) * error.left_out:
             found.append(replace(fault, before=error, after=without))
             error = without
 

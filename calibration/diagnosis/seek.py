@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -57,8 +58,6 @@ class Sought:
 
     Parameters
     ----------
-    case : Case
-        Faults of its telemetry mended.
     models : ModelComparison
         The models that were compared, and their days.
     rounds : tuple of Round
@@ -76,15 +75,14 @@ class Sought:
     left_over : Regular or None
         What comes back of the errors of the last model, about a free structure, and where it decides: whether an effect
         that was accepted is named, or whether errors that are merely large say that something is missing.
-    faults : tuple of Fault
-        Of the telemetry, which were mended before anything else.
     last_third : float or None
         As in `Diagnosis` [K].
+    faults : tuple of Fault
+        Of the telemetry, which were mended before anything else.
     seconds : float
         CPU time [s].
     """
 
-    case: Case
     models: ModelComparison
     rounds: tuple[Round, ...]
     verdict: Verdict
@@ -93,9 +91,19 @@ class Sought:
     structures: Structures | None
     free: Free | None
     left_over: Regular | None
-    faults: tuple[Fault, ...]
     last_third: float | None
-    seconds: float = field(compare=False)
+    faults: tuple[Fault, ...] = ()
+    seconds: float = field(default=0.0, compare=False)
+
+    @property
+    def case(self) -> Case:
+        """Building and telemetry, faults mended."""
+        return self.models.case
+
+    @property
+    def left(self) -> float:
+        """Held-out mean absolute error with all that was found [K]."""
+        return self.rounds[-1].after_held_out.mae
 
     @property
     def gap(self) -> float:
@@ -174,8 +182,20 @@ def seek(
     check_calibratable(case)
     whole = Forward(progress)
     faults = mend(case, tune, hold_out, {"dx": dx, "horizon": horizon}, whole.part(0.1, "telemetry"))
-    case = faults[-1].mended if faults else case
-    drawn = ModelComparison(case, ModelSettings(dx=dx), tune, hold_out, horizon)
+
+    def without(mended: tuple[Fault, ...]) -> Sought:
+        models = ModelComparison(mended[-1].mended if mended else case, ModelSettings(dx=dx), tune, hold_out, horizon)
+        return replace(_seek(models, known, ruled_out, whole), faults=mended)
+
+    sought, certain = without(faults), tuple(itertools.takewhile(lambda fault: fault.is_certain, faults))
+    if len(certain) < len(faults) and sought.structures is not None:  # what is missing can look like a fault
+        sought = min(sought, without(certain), key=lambda each: each.left)
+    verdict, seconds = with_faults(sought.verdict, sought.faults), time.process_time() - began
+    return replace(sought, verdict=verdict, seconds=seconds)
+
+
+def _seek(drawn: ModelComparison, known: Sequence[str], ruled_out: Sequence[str], whole: Forward) -> Sought:
+    """Seek what the models of a case leave out, whose telemetry has no faults."""
     untestable = drawn.untestable()
     untestable |= reasons_of(known, ruled_out, untestable)
     whole.say("baseline")
@@ -194,10 +214,7 @@ def seek(
     verdict = doubted(judge(rounds, untestable, left_over), {s.effects[-1] for s in steps if s.void})
     if free is not None and structures is not None:
         verdict = with_recurring(verdict, free, structures.rungs)
-    return Sought(
-        case, models, rounds, with_faults(verdict, faults), steps, floor, structures, free, left_over,
-        faults, last_third, time.process_time() - began,
-    )  # fmt: skip
+    return Sought(models, rounds, verdict, steps, floor, structures, free, left_over, last_third)
 
 
 def _begin(
