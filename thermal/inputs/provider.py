@@ -299,6 +299,12 @@ class InputProvider:
             return np.asarray(people / most) if most > 0.0 else np.zeros(len(people))
         return np.where(self._middle.day_of_week < 5, self._within(*_WORK), 0.0)
 
+    @property
+    def awake(self) -> FloatArray:
+        """Presence of people at work or at home, shape (n_time,): as counted, or where they are not, by day."""
+        counted = self.normalisation.people is not None and "people" in self.series
+        return self.occupancy if counted else np.maximum(self.occupancy, self.at_home)
+
     @cached_property
     def at_home(self) -> FloatArray:
         """Presence of people in a home while they are awake, by the clock, shape (n_time,) [-]."""

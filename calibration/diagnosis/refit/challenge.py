@@ -60,6 +60,7 @@ def challenge(
         return models, tuple(rounds)
     settings = replace(models.settings, scopes={**models.settings.scopes, **scopes})
     zoned = replace(models, settings=settings, tune=models.tuned, hold_out=models.judged)
+    zoned.drivers.openings = models.drivers.openings
     known = dict(rounds[0].before.effects)
     try:
         for effects, least in _rivals(rounds, known):

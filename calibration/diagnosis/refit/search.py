@@ -16,6 +16,7 @@ from calibration.diagnosis.decide.levels import APART
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.diagnosis.refit.refit import ACCEPTED, WINDOWS, HeldOut, Refit, Work, look_again, promising
 from calibration.diagnosis.screen.gains import Gain
+from calibration.diagnosis.screen.openings import openings_beyond
 from calibration.diagnosis.screen.own_nulls import OwnNulls, own_nulls
 from calibration.diagnosis.screen.screen import Screening, screen
 from calibration.progress import Forward, Progress
@@ -167,6 +168,8 @@ def _next_round(models: ModelComparison, sought: _Sought, candidates: Sequence[s
     done, fit, errors, ahead, own = sought.done, sought.fit, sought.errors, sought.ahead, sought.own
     part("screening", 0, 1)
     open_ = [e for e in candidates if all(r in fit.effects for r in CATALOGUE[e].requires)]
+    if WINDOWS in open_ and WINDOWS not in fit.effects:
+        models.drivers.openings = openings_beyond(fit.built.grid, fit.theta, models.drivers, fit.built.inputs)
     made, gains, generic = screen(models, fit, open_)
     if own is not None:
         made.jacobian = None

@@ -83,7 +83,7 @@ def openings_beyond(grid: SymbolicModel, theta: FloatArray, drivers: InputProvid
     model = reduced_model(grid, [theta])
     rows, metered, needed = step_balance(model, theta, inputs)
     unit = -model.network.anatomy.air_heat_capacity * drivers.through_windows[rows]
-    opened[rows] = _opened_when(metered - needed, unit, drivers.occupancy[rows], inputs.step)
+    opened[rows] = _opened_when(metered - needed, unit, drivers.awake[rows], inputs.step)
     return opened
 
 

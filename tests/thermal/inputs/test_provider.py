@@ -63,6 +63,9 @@ def test_presence_follows_the_clock_of_the_building(lively_case: CaseOf) -> None
     assert (drivers.occupancy[friday & ((hours < 7.4) | (hours > 18.6))] == 0.0).all()
     # half are there at eight and at eighteen, so that a working day has ten hours
     assert drivers.occupancy[friday].sum() / 6.0 == pytest.approx(10.0, abs=1e-9)
+    # where nobody counts, people may be at home as well
+    assert (drivers.awake[(hours > 8.6) & (hours < 22.4)] == 1.0).all()
+    assert (drivers.awake[(hours < 5.4) | (hours > 23.6)] == 0.0).all()
 
 
 def test_counted_people_go_before_office_hours(lively_case: CaseOf) -> None:
@@ -71,6 +74,7 @@ def test_counted_people_go_before_office_hours(lively_case: CaseOf) -> None:
     people = {"A/occupancy_count_sensor": np.arange(n) % 4.0, "B/occupancy_count_sensor": np.full(n, 1.0)}
     drivers = telemetry_inputs(changed(case, **people))
     assert drivers.occupancy == pytest.approx((np.arange(n) % 4.0 + 1.0) / 4.0)
+    assert drivers.awake is drivers.occupancy
 
 
 def test_usual_temperature_knows_the_hour_and_not_the_stamp(lively_case: CaseOf) -> None:

@@ -1,4 +1,4 @@
-"""Open windows sought again: found where another effect has won that takes heat at like times, and left alone else."""
+"""Open windows: sought beyond the calibrated model, and again where another effect won that takes heat at like times."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.diagnosis.refit.refit import WINDOWS, Refit, Work, held_out, look_again
+from calibration.diagnosis.refit.search import search
 from calibration.diagnosis.screen.gains import Gain
 from calibration.diagnosis.screen.screen import screen
 from calibration.evaluation.settings import ModelSettings
@@ -74,6 +75,16 @@ def refit(effect: str) -> Refit:
     found = work.refit([Gain(**{**vars(gain), "zones": (planted()[1],)})], {})
     assert found is not None
     return found
+
+
+def test_windows_are_seen_beyond_the_calibrated_model() -> None:
+    models, fit, work, _ = at_work()
+    models.drivers.openings = np.eye(*models.drivers.openings.shape)  # whatever was seen before
+    found = search(models, fit, work.held_out, [WINDOWS])[0].accepted
+    _, zone, opened = planted()
+    seen = models.drivers.openings
+    assert found is not None and found.screened.zones == (zone,)
+    assert (seen[:, 0] * opened).sum() > 0.8 * max(opened.sum(), seen[:, 0].sum()) and not seen[:, 1:].any()
 
 
 def test_windows_are_found_behind_the_effect_that_won() -> None:
