@@ -1,7 +1,7 @@
 """An effect fitted together with all that was accepted before, and whether it may be accepted too.
 
-When a window stood open is seen beyond a model that lacks what windows let out, and a poor guess lets another effect win
-that takes heat at like times. So it is looked for again with that effect's parameters, and without its heat.
+When a window stood open is seen beyond a model that lacks what windows let out, and a poor guess lets another effect
+win that takes heat at like times. So it is looked for again with that effect's parameters, and without its heat.
 """
 
 from collections.abc import Mapping, Sequence

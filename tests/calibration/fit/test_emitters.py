@@ -104,6 +104,15 @@ def test_the_baseline_of_a_diagnosis_knows_rooms_with_radiators_from_those_with_
     assert held_out(models, fit).mae < 0.2
 
 
+def test_rooms_are_told_apart_though_a_meter_reads_half() -> None:
+    case = twin("floor", "radiator")
+    frame = case.telemetry.frame.copy()
+    frame[f"H_below/{HEATING_POWER}"] *= 0.5
+    models, fit = fit_baseline(ModelComparison(Case(case.building, Telemetry.from_frame(frame))), {})
+    assert fit.values["floor_heat_share@below"] > 0.9 > 0.3 > fit.values["floor_heat_share@above"]
+    assert held_out(models, fit).mae < 0.5
+
+
 def test_heated_floors_are_found_though_a_lumped_model_makes_up_for_leaks() -> None:
     models, fit = fit_baseline(ModelComparison(twin("floor", "floor", leaks=25.0)), {})
     assert models.settings.structure.emitter == "floor"
