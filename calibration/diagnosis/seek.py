@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from calibration.diagnosis.baseline import fit_baseline
 from calibration.diagnosis.decide.verdict import Verdict, doubted, gains_of, judge, summarised
-from calibration.diagnosis.faults import Fault, mend, with_faults
+from calibration.diagnosis.faults import LEAST, Fault, mend, with_faults
 from calibration.diagnosis.free import Free, drawing_fails, held_against, search_free, with_recurring
 from calibration.diagnosis.handed_on import other_structures
 from calibration.diagnosis.known import reasons_of
@@ -183,13 +183,18 @@ def seek(
     whole = Forward(progress)
     faults = mend(case, tune, hold_out, {"dx": dx, "horizon": horizon}, whole.part(0.1, "telemetry"))
 
-    def without(mended: tuple[Fault, ...]) -> Sought:
-        models = ModelComparison(mended[-1].mended if mended else case, ModelSettings(dx=dx), tune, hold_out, horizon)
+    def without(
+        mended: tuple[Fault, ...], tuned: Sequence[Interval] = tune, judged: Sequence[Interval] = hold_out
+    ) -> Sought:
+        of = mended[-1].mended if mended else case
+        models = ModelComparison(of, ModelSettings(dx=dx), tuned, judged, horizon)
         return replace(_seek(models, known, ruled_out, whole), faults=mended)
 
     sought, certain = without(faults), tuple(itertools.takewhile(lambda fault: fault.is_certain, faults))
     if len(certain) < len(faults) and sought.structures is not None:  # what is missing can look like a fault
-        sought = min(sought, without(certain), key=lambda each: each.left)
+        other = without(certain, sought.models.tuned, sought.models.judged)
+        if other.left < (1.0 - LEAST) * sought.left:
+            sought = replace(other, last_third=sought.last_third)
     verdict, seconds = with_faults(sought.verdict, sought.faults), time.process_time() - began
     return replace(sought, verdict=verdict, seconds=seconds)
 

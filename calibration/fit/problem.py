@@ -37,8 +37,9 @@ _MEDIAN_SIZE = 0.6744897501960817  #: Median of the size of a standard normal [-
 #: model's multipliers, where drawings know little of single zones and pairs, a factor of seven in 95 %.
 SHRINKAGE, _LUMPED_SHRINKAGE = 0.3, 1.0
 
-#: Of what rooms are not alike in [-], as far apart as an estimate may get: one has a heated floor, the next a radiator.
-#: From a third, a house with floors below and radiators above was taken for one of floors, at thrice the error.
+#: Of what rooms are not alike in, lumped or not, as far apart as an estimate may get [-]: one has a heated floor, the
+#: next a radiator. From a third, a house with floors below and radiators above was taken for one of floors, at thrice
+#: the error.
 _UNLIKE = {"floor_heat_share": 3.0}
 
 

@@ -21,6 +21,7 @@ from calibration.diagnosis.screen.own_nulls import OwnNulls, own_nulls
 from calibration.diagnosis.screen.screen import Screening, screen
 from calibration.progress import Forward, Progress
 from calibration.stages import stage
+from thermal._types import FloatArray
 from thermal.effects.catalogue import CATALOGUE
 from thermal.effects.effect import ALIKE
 
@@ -143,24 +144,31 @@ def search(
     progress : callable, optional
         Called with stage, done, total.
     """
-    whole, sought = Forward(progress), _Sought((), baseline, errors)
+    whole, sought = Forward(progress), _Sought((), baseline, errors, models.drivers.openings)
     while not sought.over and len(sought.done) < ROUNDS:
         number = len(sought.done) + 1
         part = whole.part(_SHARE, f"round {number}")
-        sought = stage(f"round {number}", partial(_next_round, models, sought, candidates, part))
+        sought = stage(f"round {number}", partial(_with_openings, models, sought, candidates, part))
+        models.drivers.openings = sought.openings  # of a round that was done before an interruption, too
     return sought.done
 
 
 @dataclass(frozen=True)
 class _Sought:
-    """Where the search is: rounds done, the model that the next begins with, and its held-out errors."""
+    """Where the search is: rounds done, the model that the next begins with, its held-out errors, and open windows."""
 
     done: tuple[Round, ...]
     fit: Fit
     errors: HeldOut
+    openings: FloatArray
     ahead: Refit | None = None
     own: OwnNulls | None = None
     over: bool = False
+
+
+def _with_openings(models: ModelComparison, sought: _Sought, candidates: Sequence[str], part: Progress) -> _Sought:
+    """Do a round, and tell when windows are seen to stand open after it."""
+    return replace(_next_round(models, sought, candidates, part), openings=models.drivers.openings)
 
 
 def _next_round(models: ModelComparison, sought: _Sought, candidates: Sequence[str], part: Progress) -> _Sought:
@@ -168,14 +176,15 @@ def _next_round(models: ModelComparison, sought: _Sought, candidates: Sequence[s
     done, fit, errors, ahead, own = sought.done, sought.fit, sought.errors, sought.ahead, sought.own
     part("screening", 0, 1)
     open_ = [e for e in candidates if all(r in fit.effects for r in CATALOGUE[e].requires)]
-    if WINDOWS in open_ and WINDOWS not in fit.effects:
+    if WINDOWS in open_ and WINDOWS not in (fit if ahead is None else ahead.fit).effects:
         models.drivers.openings = openings_beyond(fit.built.grid, fit.theta, models.drivers, fit.built.inputs)
     made, gains, generic = screen(models, fit, open_)
     if own is not None:
         made.jacobian = None
     exchanged = _exchanged(models, done, made, open_)
     if exchanged is not None:
-        return _Sought((*done[:-2], exchanged), exchanged.after, exchanged.after_held_out, exchanged.pair, own)
+        after, errors, done = exchanged.after, exchanged.after_held_out, (*done[:-2], exchanged)
+        return replace(sought, done=done, fit=after, errors=errors, ahead=exchanged.pair, own=own)
     work = Work(models, fit, errors, made, ACCEPTED if own is None else accepted_from(own))
     part("fitting effects", 1, 4)
     refits = _refits(work, gains, ahead)
@@ -195,7 +204,7 @@ def _next_round(models: ModelComparison, sought: _Sought, candidates: Sequence[s
     done = (*done, Round(fit, errors, made, tuple(gains), generic, tuple(refits), best, own, pair))
     if best is None:
         return replace(sought, done=done, over=True)
-    return _Sought(done, best.fit, best.held_out, pair, own)
+    return replace(sought, done=done, fit=best.fit, errors=best.held_out, ahead=pair, own=own)
 
 
 def accepted_from(own: OwnNulls) -> float:

@@ -2,8 +2,7 @@
 
 An open window is a conductance to outdoor that comes and goes at a stroke, a few times a day and while people are
 there. The heat that a model of the case needs to follow the measured temperatures, step by step, is set against that
-which was metered; a hidden Markov model of two states says when the difference is that of a window of one size. The
-model has every parameter at its start first, for calibration without windows would hide part of it.
+which was metered; a hidden Markov model of two states says when the difference is that of a window of one size.
 """
 
 import numpy as np
