@@ -291,19 +291,25 @@ class InputProvider:
         return np.asarray(np.array([profile[zone] for zone in self.zones]).T[slot])
 
     @cached_property
+    def _counted(self) -> FloatArray | None:
+        """People counted over their largest number, shape (n_time,) [-]; None where nobody counts them."""
+        most = self.normalisation.people
+        if most is None or "people" not in self.series:
+            return None
+        people = self.series["people"]
+        return np.asarray(people / most) if most > 0.0 else np.zeros(len(people))
+
+    @cached_property
     def occupancy(self) -> FloatArray:
         """Presence of people, shape (n_time,): counted over their largest number, or working days from 8 to 18."""
-        most = self.normalisation.people
-        if most is not None and "people" in self.series:
-            people = self.series["people"]
-            return np.asarray(people / most) if most > 0.0 else np.zeros(len(people))
+        if self._counted is not None:
+            return self._counted
         return np.where(self._middle.day_of_week < 5, self._within(*_WORK), 0.0)
 
     @property
     def awake(self) -> FloatArray:
         """Presence of people at work or at home, shape (n_time,): as counted, or where they are not, by day."""
-        counted = self.normalisation.people is not None and "people" in self.series
-        return self.occupancy if counted else np.maximum(self.occupancy, self.at_home)
+        return self.occupancy if self._counted is not None else np.maximum(self.occupancy, self.at_home)
 
     @cached_property
     def at_home(self) -> FloatArray:
