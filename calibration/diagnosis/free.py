@@ -9,11 +9,11 @@ from calibration.diagnosis.decide.name import VerdictName
 from calibration.diagnosis.decide.verdict import Verdict
 from calibration.diagnosis.known import reasons_of
 from calibration.diagnosis.refit.comparison import Effects, Fit, ModelComparison
-from calibration.diagnosis.refit.refit import beyond_a_step, held_out
+from calibration.diagnosis.refit.refit import HeldOut, beyond_a_step, held_out
 from calibration.diagnosis.refit.search import Round, search
 from calibration.diagnosis.screen.regular import Regular, regular
 from calibration.fit.fitted_case import FittedCase, fit_case
-from calibration.fit.ladder import CLOCK
+from calibration.fit.ladder import CLOCK, RECURRING, STEADY
 from calibration.fit.left_out import Known, values_of
 from calibration.fit.result import Rung
 from calibration.progress import Forward, Progress
@@ -54,6 +54,9 @@ class Free:
         What comes back of the errors of its last model.
     kept : FittedCase
         The structure, with the effects that were accepted.
+    without : HeldOut or None
+        Errors without its gain that recurs: of the drawing as calibrated, or of the lumped model; None where it has
+        none, or somebody said of people's heat that it is there, or not.
     """
 
     models: ModelComparison
@@ -61,6 +64,7 @@ class Free:
     untestable: dict[str, str]
     left_over: Regular
     kept: FittedCase
+    without: HeldOut | None = None
 
 
 def held_against(rounds: Sequence[Round], quality: GeometryQuality) -> tuple[Fit, ...]:
@@ -90,7 +94,7 @@ def drawing_fails(rungs: Sequence[Rung], kept: FittedCase | None) -> bool:
     kept : FittedCase or None
         What predicts left-out days best, where that is not the first.
     """
-    if kept is None or not kept.settings.structure.lumped:
+    if kept is None or not (kept.settings.structure.lumped or kept.settings.structure.recurring):
         return False
     return next(r for r in rungs if r.chosen).left_out_mae < (1.0 - FAILS) * rungs[0].left_out_mae
 
@@ -106,6 +110,8 @@ def recurs(rungs: Sequence[Rung]) -> tuple[float, float] | None:
         Structures by their errors.
     """
     errors = {r.name: r.left_out_mae for r in rungs}
+    if any(r.chosen and r.name == RECURRING for r in rungs):
+        return errors[STEADY], errors[RECURRING]
     without, with_it = errors.get("lumped"), errors.get("recurring")
     if without is None or with_it is None or with_it > _RECURS * without:
         return None
@@ -154,6 +160,7 @@ def is_recurring(verdict: Verdict) -> bool:
 
 def search_free(
     models: ModelComparison,
+    drawing: HeldOut,
     kept: FittedCase,
     known: Sequence[str] = (),
     ruled_out: Sequence[str] = (),
@@ -170,6 +177,8 @@ def search_free(
     ----------
     models : ModelComparison
         The case as drawn, with its days.
+    drawing : HeldOut
+        Errors of the drawing as calibrated.
     kept : FittedCase
         The free structure.
     known, ruled_out : sequence of str
@@ -184,10 +193,11 @@ def search_free(
     moved = beyond_a_step(found.problem, found.theta, np.sqrt(np.diag(found.covariance)), CATALOGUE[CLOCK].shifts)
     if CLOCK in chosen.effects and CLOCK not in said and moved:
         attempts.insert(0, (whole, {e: z for e, z in chosen.effects.items() if e != CLOCK}, CLOCK))
-    if whole.recurring and GAINS not in said:
+    if whole.lumped and whole.recurring and GAINS not in said:
         attempts.insert(0, (replace(whole, recurring=False), chosen.effects, GAINS))
     if whole.sun and SUN not in said and models.drivers.estimates(IRRADIANCE):
         attempts.insert(0, (replace(whole, sun=False), chosen.effects, SUN))
+    without = drawing if whole.recurring and not whole.lumped and GAINS not in said else None
     for structure, own, sought in attempts:
         settings = replace(
             models.settings, structure=structure, scopes=chosen.scopes, normalisation=chosen.normalisation
@@ -199,7 +209,9 @@ def search_free(
         untestable |= reasons_of(known, ruled_out, untestable) | dict.fromkeys(own, "part of the structure")
         testable = [e for e in CATALOGUE if e not in untestable]
         baseline = free.fit({**own, **{e: () for e in known}}, [values_of(found)])
-        rounds = search(free, baseline, held_out(free, baseline), testable, ahead.part(0.5))
+        errors = held_out(free, baseline)
+        without = errors if sought == GAINS else without
+        rounds = search(free, baseline, errors, testable, ahead.part(0.5))
         final = rounds[-1].after
         if sought is None or sought in final.effects:
             break
@@ -207,4 +219,4 @@ def search_free(
         known_fit = Known(final.problem, final.model, final.point)
         further = replace(chosen, structure=structure, effects=dict(final.effects))
         kept = fit_case(models.case, models.tuned, models.judged, further, ahead.part(1.0), known_fit)
-    return Free(free, rounds, untestable, regular(free, final), kept)
+    return Free(free, rounds, untestable, regular(free, final), kept, without)

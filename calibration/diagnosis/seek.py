@@ -11,12 +11,20 @@ from typing import Any, NamedTuple
 from calibration.diagnosis.baseline import fit_baseline
 from calibration.diagnosis.decide.verdict import Verdict, doubted, gains_of, judge, summarised
 from calibration.diagnosis.faults import LEAST, Fault, mend, with_faults
-from calibration.diagnosis.free import Free, drawing_fails, held_against, search_free, with_recurring
+from calibration.diagnosis.free import (
+    GAINS,
+    Free,
+    drawing_fails,
+    held_against,
+    is_recurring,
+    search_free,
+    with_recurring,
+)
 from calibration.diagnosis.handed_on import other_structures
 from calibration.diagnosis.known import reasons_of
 from calibration.diagnosis.refit.challenge import challenge
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
-from calibration.diagnosis.refit.how_far import Step, how_far
+from calibration.diagnosis.refit.how_far import Step, how_far, step_by_structure
 from calibration.diagnosis.refit.refit import HeldOut, elsewhere, held_out
 from calibration.diagnosis.refit.search import Round, search
 from calibration.diagnosis.screen.regular import Regular, regular
@@ -77,6 +85,9 @@ class Sought:
         that was accepted is named, or whether errors that are merely large say that something is missing.
     last_third : float or None
         As in `Diagnosis` [K].
+    recurring : Step or None
+        How far people's heat closes the gap where it recurs in each zone with a course of its own, so that a structure
+        holds it.
     faults : tuple of Fault
         Of the telemetry, which were mended before anything else.
     seconds : float
@@ -92,6 +103,7 @@ class Sought:
     free: Free | None
     left_over: Regular | None
     last_third: float | None
+    recurring: Step | None = None
     faults: tuple[Fault, ...] = ()
     seconds: float = field(default=0.0, compare=False)
 
@@ -108,14 +120,21 @@ class Sought:
     @property
     def gap(self) -> float:
         """Held-out mean absolute error of the calibrated baseline, before faults were mended [K]."""
-        return self.faults[0].before.held_out if self.faults else self.rounds[0].held_out.mae
+        if self.faults:
+            return self.faults[0].before.held_out
+        return self.rounds[0].held_out.mae if self.recurring is None else self.recurring.before
+
+    @property
+    def all_steps(self) -> tuple[Step, ...]:
+        """How far each effect closes the gap, that which a structure holds first."""
+        return self.steps if self.recurring is None else (self.recurring, *self.steps)
 
     def to_dict(self) -> dict[str, Any]:
         """Entries of ``diagnosis.json`` that tell the answer."""
         return {
             "verdict": self.verdict.name,
             "gap": {"mae": self.gap, "floor": self.floor.mae},
-            **answer_entries(self.verdict, self.steps, self.rounds, self.faults, self.floor.mae),
+            **answer_entries(self.verdict, self.all_steps, self.rounds, self.faults, self.floor.mae),
             "intervals": {"mae_of_last_third": self.last_third},
             "seconds": self.seconds,
         }
@@ -217,9 +236,12 @@ def _seek(drawn: ModelComparison, known: Sequence[str], ruled_out: Sequence[str]
     models, rounds, untestable, structures, free, left_over = about
     steps, floor = how_far(models, rounds)
     verdict = doubted(judge(rounds, untestable, left_over), {s.effects[-1] for s in steps if s.void})
+    recurring = None
     if free is not None and structures is not None:
         verdict = with_recurring(verdict, free, structures.rungs)
-    return Sought(models, rounds, verdict, steps, floor, structures, free, left_over, last_third)
+        if free.without is not None and is_recurring(verdict):
+            recurring = step_by_structure(GAINS, free.without, rounds[0], floor)
+    return Sought(models, rounds, verdict, steps, floor, structures, free, left_over, last_third, recurring)
 
 
 def _begin(
@@ -258,7 +280,8 @@ def _other_structures(about: _About, known: Sequence[str], ruled_out: Sequence[s
         structures = Structures(*other_structures(models, fit, whole.part(0.5), advance))
         about = about._replace(structures=structures)
         if structures.kept is not None and drawing_fails(structures.rungs, structures.kept):  # names make up for it
-            free = search_free(models, structures.kept, known, ruled_out, whole.part(0.6, "free structure"))
+            errors = rounds[0].held_out
+            free = search_free(models, errors, structures.kept, known, ruled_out, whole.part(0.6, "free structure"))
             structures = structures._replace(kept=free.kept)
             return _About(free.models, free.rounds, free.untestable, structures, free, free.left_over)
     if unexplained and (rounds[0].accepted or alone) and not is_large(case.building.zone_names):

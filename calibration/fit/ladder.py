@@ -50,6 +50,12 @@ _EMITTERS: tuple[Unknown, Unknown] = ("floor", "radiator")
 #: Tuning days from which a gain that recurs from day to day is looked for [days]: it has to recur.
 _WEEK = 7.0
 
+#: A drawing with heat in each zone that is always there, and with heat that recurs from day to day too.
+STEADY, RECURRING = "steady", "drawn recurring"
+
+#: Share of the former's error on left-out days below which the latter is kept [-]: it has seven numbers a zone.
+RECURS = 0.75
+
 
 def climb(drawn: FittedCase, began: float, progress: Progress | None = None) -> CalibrationResult:
     """Fit a building in other structures too, and keep what predicts tuning days better that a fit has not seen.
@@ -189,24 +195,23 @@ def climb_from(
             begun["wind"], base, fitted = (follows, fitted), follows, wind
     scopes: dict[str, Scope] = {p.base: "zone" for p in parameters if p.base in MASSES}
     if scopes and plain and drawn and not base.scopes and len(fitted.model.network.zones) > 1:
-        zoned = ladder.solve(replace(base, scopes={**base.scopes, **scopes}), fitted)
-        looked.append(ladder.look("zoned", zoned.best, zoned))
-    looked += free
+        looked.append(ladder.fitted("zoned", replace(base, scopes={**base.scopes, **scopes}), fitted))
     lumped = free[_best(free, ADVANCE)].fit
+    if days_of(given.tuned) >= _WEEK:
+        looked += ladder.gains(base, fitted, (1.0 - advance) * looked[0].left.mae)
+    looked += free
     if lumped is not None and days_of(given.tuned) >= _WEEK:
         recurring = replace(lumped.settings, structure=replace(lumped.settings.structure, recurring=True))
         begun["recurring"] = recurring, lumped.best
         looked.append(ladder.look("recurring", _begun(given, *begun["recurring"])))
     best = _best(looked, advance)
     if looked[best].name in begun:
-        found = ladder.solve(*begun[looked[best].name])
-        looked[best] = ladder.look(looked[best].name, found.best, found)
+        looked[best] = ladder.fitted(looked[best].name, *begun[looked[best].name])
     kept = looked[best]
     if kept.fit is not None and kept.fit.settings.structure.lumped and not kept.fit.settings.effects:
         moved = replace(kept.fit.settings, effects={CLOCK: ()})
         # fitted at once: Newton steps from heat that is not moved at all tell nothing of half an hour
-        shifted = ladder.solve(moved, kept.fit.best)
-        looked.append(ladder.look("shifted", shifted.best, shifted))
+        looked.append(ladder.fitted("shifted", moved, kept.fit.best))
         kept = looked[-1] if looked[-1].left.mae < (1.0 - _MOVED) * kept.left.mae else kept
     rungs = tuple(Rung(each.name, each.left.mae, each.parameters, each is kept) for each in looked)
     return rungs, None if kept.fit is None else replace(kept.fit, left=kept.left), kept.left
@@ -258,6 +263,11 @@ class _Ladder:
 
         return stage("structure", solved)
 
+    def fitted(self, name: str, settings: CalibrationSettings, known: Fitted | None = None) -> _Looked:
+        """Fit a structure, and leave days out."""
+        found = self.solve(settings, known)
+        return self.look(name, found.best, found)
+
     @property
     def guesses(self) -> bool:
         """Whether there are plain heaters of which nobody says what they give their heat by."""
@@ -273,8 +283,7 @@ class _Ladder:
         seen = self.look(name, _begun(self.given, settings, known))
         if not seen.left.mae < (1.0 - least) * error:  # nor where days are too few to leave any out
             return seen
-        found = self.solve(settings)
-        return self.look(name, found.best, found)
+        return self.fitted(name, settings)
 
     def emitters(self, fitted: Fitted, error: float) -> list[_Looked]:
         """Look at heat that floors give and radiators too, as far as it promises anything; then at radiators alone."""
@@ -286,8 +295,23 @@ class _Ladder:
             return []
         if not seen.left.mae < (1.0 - ADVANCE) * error:
             return [seen]
-        simpler = self.solve(radiator)
-        return [self.look("radiator", simpler.best, simpler), seen]
+        return [self.fitted("radiator", radiator), seen]
+
+    def gains(self, base: CalibrationSettings, fitted: Fitted, error: float) -> list[_Looked]:
+        """Fit a drawing with heat that recurs from day to day, beside one whose unknown heat is always there.
+
+        Nothing unless it takes much of the other's error away, and predicts days that were left out better than an
+        error: what is missing differs from people's heat, and a drawing that is wrong takes all the freedom it gets.
+        """
+        looks = [
+            (name, replace(base, structure=replace(base.structure, steady=True, recurring=name == RECURRING)))
+            for name in (STEADY, RECURRING)
+        ]
+        always, daily = (self.look(name, _begun(self.given, given, fitted)) for name, given in looks)
+        if not daily.left.mae < min(error, RECURS * always.left.mae):
+            return []
+        always, daily = (self.fitted(name, given, fitted) for name, given in looks)
+        return [always, daily] if daily.left.mae < RECURS * always.left.mae else []
 
     def lumped(self, structure: Structure, error: float) -> list[_Looked]:
         """Fit a lumped model, and one with heated floors if the drawing has them, or if they promise anything.
@@ -299,8 +323,7 @@ class _Ladder:
         looked = [self.look("lumped", found.best, found)]
         floors = replace(found.settings, structure=replace(structure, emitter="floor"))
         if own == "floor":
-            heated = self.solve(floors)
-            looked.append(self.look("lumped floor", heated.best, heated))
+            looked.append(self.fitted("lumped floor", floors))
         elif self.guesses and looked[0].left.mae < error:
             looked.append(self.tried("lumped floor", floors, found.best, _PROMISED, looked[0].left.mae))
         return [each for each in looked if each.fit is not None]

@@ -87,12 +87,14 @@ class Rung(Plain):
 
     Parameters
     ----------
-    name : {"drawn", "named", "radiator", "floor", "wind", "zoned", "lumped", "recurring", "lumped floor", "shifted"}
-        As drawn; with what a diagnosis named; with heat that radiates or that floors give, where the case does not say
-        what gives it; with films that follow the wind; with slabs and furniture by zone; lumped; lumped with a gain
-        that recurs from day to day, with floors that are heated, or with heat and weather moved in time. ``wind`` and
-        ``zoned`` have the heat of ``radiator`` or ``floor`` too where that was kept. ``lumped`` has it in the air, but
-        for what settings or case say; ``recurring`` and ``shifted`` have what the lumped one has that they stand on.
+    name : str
+        ``drawn``; ``named`` with what a diagnosis named; ``radiator`` or ``floor`` with heat that radiates or that
+        floors give, where the case does not say what gives it; ``wind`` with films that follow the wind; ``zoned`` with
+        slabs and furniture by zone; ``steady`` and ``drawn recurring`` with a gain a zone that is always there, and
+        that recurs from day to day; ``lumped``; ``recurring``, ``lumped floor`` and ``shifted``, which are lumped with
+        such a gain, with floors that are heated, or with heat and weather moved in time. Those as drawn have the heat
+        of ``radiator`` or ``floor`` too where that was kept. ``lumped`` has it in the air, but for what settings or
+        case say; ``recurring`` and ``shifted`` have what the lumped one has that they stand on.
     left_out_mae : float
         Mean absolute error on tuning days that a fit has not seen [K]; NaN where there are too few days.
     parameters : int

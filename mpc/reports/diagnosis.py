@@ -251,10 +251,11 @@ def _measure_next(result: Diagnosis) -> list[tuple[str, str]]:
 
 def _waterfall(result: Diagnosis) -> list[tuple[str, float, float]]:
     """List held-out errors, from the baseline by each effect to the floor, each with the one before."""
-    values = [result.gap, *(s.after for s in result.steps)]
-    steps = [(f"+ {called(s.effects[-1])}", s.after, before) for s, before in zip(result.steps, values, strict=False)]
+    values = [result.start, *(s.after for s in result.all_steps)]
+    ends = zip(result.all_steps, values, strict=False)
+    steps = [(f"+ {called(s.effects[-1])}", s.after, before) for s, before in ends]
     floor = ("Floor: with regular heat of any kind added", result.floor, result.floor)
-    return [("The calibrated model", result.gap, result.gap), *steps, floor]
+    return [("The calibrated model", result.start, result.start), *steps, floor]
 
 
 def _test_sentences(result: Diagnosis) -> list[str]:
@@ -330,7 +331,7 @@ def _statistics(result: Diagnosis) -> dict[str, Any]:
             | ({} if c.testable else nothing | {"sure": "not testable"})
             for c in result.verdict.candidates
         ],
-        "closed": [vars(s) | {"names": listed([called(e) for e in s.effects])} for s in result.steps],
+        "closed": [vars(s) | {"names": listed([called(e) for e in s.effects])} for s in result.all_steps],
         "parameters": [vars(p) | {"first": first.get(p.name)} for p in final.values() if p.standard_error is not None],
         "bounds": [[n.replace("_", " ") for n, p in fit.items() if p.at_bound] or ["none"] for fit in (first, final)],
         "alternating": diagnosis_words.alternating_sentence(result),

@@ -131,6 +131,8 @@ _STRUCTURES = {
     "floor": "as drawn, with heat that floors give",
     "wind": "as drawn, with outside films that follow the wind",
     "zoned": "as drawn, with slabs and furniture of each zone's own",
+    "steady": "as drawn with a gain in each zone that is always there",
+    "drawn recurring": "as drawn with a gain in each zone that recurs from day to day",
     "lumped": "lumped into air and mass a zone",
     "recurring": "lumped into air and mass a zone, with a gain that recurs from day to day",
     "corrected": "with heat of unknown cause",

@@ -132,20 +132,33 @@ def on_plane(inputs: InputProvider, azimuth: float, tilt: float) -> FloatArray:
     return np.asarray(sum(inputs.sun.plane(azimuth, tilt)))
 
 
-def _wave(inputs: InputProvider, of: Callable[[FloatArray], FloatArray], hours: float) -> FloatArray:
-    return of(2.0 * np.pi * inputs.clock / hours)
+def _wave(of: Callable[[FloatArray], FloatArray], period: float, hours: FloatArray) -> FloatArray:
+    return of(2.0 * np.pi * hours / period)
 
 
-def waves_of_day(*hours: float) -> list[Signal]:
+def _by_clock(inputs: InputProvider, of: Callable[[FloatArray], FloatArray]) -> FloatArray:
+    return of(inputs.clock)
+
+
+def daily_waves(*periods: float) -> dict[str, Callable[[FloatArray], FloatArray]]:
+    """Sine and cosine of each period by name, as functions of the hour of the day.
+
+    Parameters
+    ----------
+    *periods : float
+        Parts of a day [h].
+    """
+    return {
+        f"{of.__name__} of {period:g} h": partial(_wave, of, period) for period in periods for of in (np.sin, np.cos)
+    }
+
+
+def waves_of_day(*periods: float) -> list[Signal]:
     """Sine and cosine of each period, which repeat from day to day by the clock on the wall.
 
     Parameters
     ----------
-    *hours : float
-        Periods [h], parts of a day.
+    *periods : float
+        Parts of a day [h].
     """
-    return [
-        Signal.made(f"{of.__name__} of {period:g} h", "1", _wave, given={"of": of, "hours": period})
-        for period in hours
-        for of in (np.sin, np.cos)
-    ]
+    return [Signal.made(name, "1", _by_clock, given={"of": of}) for name, of in daily_waves(*periods).items()]

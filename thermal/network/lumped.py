@@ -16,7 +16,8 @@ import scipy.sparse.linalg as sla
 
 from thermal._types import FloatArray, IntArray
 from thermal.case.building import FACADES, GeometryQuality
-from thermal.inputs.signals import CONSTANT, Signal, on_plane, waves_of_day
+from thermal.inputs.signals import Signal, on_plane
+from thermal.network.gains import add_gains
 from thermal.network.graph import GraphBuilder
 from thermal.network.network import ThermalNetwork
 from thermal.network.structure import Structure
@@ -47,9 +48,6 @@ _APART = 0.01
 
 #: Directions that the sun is taken from [deg]: azimuth and tilt of the compass's points and of a roof.
 _PLANES = {**{name: (90.0 * number, VERTICAL) for number, name in enumerate(FACADES)}, "roof": (0.0, UPWARD)}
-
-#: Periods of a gain that recurs from day to day [h].
-_PERIODS = (24.0, 12.0, 8.0)
 
 #: Solar transmittance of a pane that nothing tells [-]: double glazing (EN 410).
 _TRANSMITTANCE = 0.6
@@ -152,7 +150,9 @@ def lump(network: ThermalNetwork, quality: GeometryQuality, structure: Structure
             zone, i, air[i : i + 1], np.ones(1), int(air[i]), -1, (), (), int(mass[i]), room.floor_area, room.volume
         )
         _add_heated(graph, drawn, i, air, multiplier)
-        _add_gains(graph, graph.anatomy.rooms[zone], [p for p in old.panes if p.zone == zone], quality, structure)
+        if structure.sun:
+            _add_sun(graph, graph.anatomy.rooms[zone], [p for p in old.panes if p.zone == zone], quality)
+    add_gains(graph, structure)
     return graph, air
 
 
@@ -181,16 +181,9 @@ def _add_heated(
                 graph.face(f"screed-{kind} {zone} {side}", scale, node, np.asarray(far)[there], conductance[there])
 
 
-def _add_gains(
-    graph: GraphBuilder, room: Room, panes: list[Pane], quality: GeometryQuality, structure: Structure
-) -> None:
-    """Add heat that is always there, that recurs from day to day, and the sun from each direction."""
-    steady = graph.own(PARAMETERS["constant_gain"].of("zone", room.name))
-    graph.source(f"constant gain {room.name}", steady, int(room.air[0]), CONSTANT, room.floor_area)
-    for wave in waves_of_day(*_PERIODS) if structure.recurring else ():
-        value = graph.own(PARAMETERS["recurring_gain"].of("zone", f"{room.name}, {wave.name}"))
-        graph.source(f"recurring gain {room.name}, {wave.name}", value, int(room.air[0]), wave, room.floor_area)
-    for name, (azimuth, tilt) in _PLANES.items() if structure.sun else ():
+def _add_sun(graph: GraphBuilder, room: Room, panes: list[Pane], quality: GeometryQuality) -> None:
+    """Add the sun from each direction."""
+    for name, (azimuth, tilt) in _PLANES.items():
         looking = [p for p in panes if (direction_of(p.azimuth) if p.tilt >= 45.0 else "roof") == name]
         glass = sum(p.area * (p.transmittance or _TRANSMITTANCE) for p in looking) / room.floor_area
         own = PARAMETERS["solar_aperture"]
@@ -281,4 +274,3 @@ def _before(network: ThermalNetwork, joined: sp.csr_matrix, pipes: FloatArray) -
             if layer.node.size > 1:
                 before[k] += (layer.area / area) ** 2 * layer.share.prod() / joined[layer.node[0], layer.node[1]]
     return before
-

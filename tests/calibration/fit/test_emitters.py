@@ -23,12 +23,17 @@ from thermal.case.telemetry import Telemetry
 from thermal.model.matrices import SymbolicModel
 from thermal.model.step import IMPLICIT_EULER, Stepper
 from thermal.network.build import build_network
+from thermal.network.gains import daily_gains
 
 SITE = Location(latitude=48.0, longitude=12.0, elevation=0.0, timezone="Etc/GMT-1")
 SCREED = Layer(thickness=0.06, conductivity=1.2, density=2000.0, heat_capacity=1000.0)
 FOAM = Layer(thickness=0.08, conductivity=0.035, density=30.0, heat_capacity=1450.0)
 BRICK = Layer(thickness=0.2, conductivity=0.6, density=1600.0, heat_capacity=900.0)
 ZONES = ("below", "above")
+
+#: Heat of people that no meter knows of, by the hour of the day and room [W]: evenings below, nights above.
+PEOPLE = np.zeros((24, 2))
+PEOPLE[18:23, 0], PEOPLE[[22, 23, *range(7)], 1] = 400.0, 300.0
 
 
 def house(*emitters: str | None) -> Building:
@@ -55,10 +60,10 @@ def house(*emitters: str | None) -> Building:
     return Building("twin", SITE, 0.0, table, devices=heaters)
 
 
-def twin(*emitters: str | None, days: int = 6, leaks: float = 0.0) -> Case:
+def twin(*emitters: str | None, days: int = 6, leaks: float = 0.0, people: bool = False) -> Case:
     """Telemetry of a house with these emitters, by half hours, and a case that says nothing of them.
 
-    Each room may leak besides, air of this conductance to outdoor [W/K].
+    Each room may leak besides, air of this conductance to outdoor [W/K], and people may live there.
     """
     rng, truth = np.random.default_rng(3), build_network(house(*emitters))
     m = SymbolicModel(truth).matrices(truth.start())
@@ -70,6 +75,7 @@ def twin(*emitters: str | None, days: int = 6, leaks: float = 0.0) -> Case:
     for k in range(stamps.size):
         outside = np.array([outdoor[k], *(heat[k, ZONES.index(s.name.rpartition(" ")[2])] for s in truth.signals)])
         lost = leaks * (zone[-1] - outdoor[k]) if zone else 0.0
+        lost = lost - people * PEOPLE[stamps[k].hour] * rng.uniform(0.8, 1.2)
         state, mean, _, _ = stepper.advance(state, outside[:, None], (heat[k] - lost)[:, None], np.zeros((0, 1)))
         zone.append(mean[:, 0] + rng.normal(0.0, 0.03, 2))
     frame = pd.DataFrame({f"weather_station/{OUTDOOR_TEMPERATURE}": outdoor + 273.15}, index=stamps)
@@ -125,6 +131,32 @@ def test_leaks_of_a_house_with_heated_floors_are_found() -> None:
     found = seek(twin("floor", "floor", days=14, leaks=40.0))
     assert found.models.settings.structure.emitter == "floor"
     assert found.verdict.name == "group" and set(found.verdict.candidates[0].group) == {"infiltration", "thermal_bridge"}
+
+
+def test_peoples_heat_that_recurs_in_each_room_is_found_beside_a_drawing_that_holds() -> None:
+    found = seek(twin(None, None, days=18, people=True))
+    structure = found.models.settings.structure
+    assert structure.recurring and not structure.lumped
+    assert (found.verdict.name, found.verdict.candidates[0].effect) == ("named", "internal_gains")
+    told = found.to_dict()
+    assert found.gap == told["gap"]["mae"] > 3.0 * found.left
+    assert told["how_far"][0]["effects"] == ("internal_gains",)
+    assert told["how_far"][0]["held_out_mae_before"] == found.gap
+    # the first harmonics of what was put in
+    for i, zone in enumerate(ZONES):
+        course, true = daily_gains(zone, found.rounds[-1].after.values), PEOPLE[:, i] / 20.0
+        harmonics = np.fft.rfft(true)
+        harmonics[0], harmonics[4:] = 0.0, 0.0
+        smooth = np.fft.irfft(harmonics)
+        assert np.corrcoef(course, smooth)[0, 1] > 0.95
+        assert np.ptp(course) == pytest.approx(np.ptp(smooth), rel=0.25)
+
+
+def test_a_house_without_people_has_no_heat_that_recurs() -> None:
+    found = seek(twin(None, None, days=18))
+    assert found.verdict.name == "no_gap" and found.recurring is None
+    result = climbed(twin(None, None, days=18))
+    assert not result.settings.structure.recurring
 
 
 def test_radiators_are_no_floors() -> None:
