@@ -74,16 +74,20 @@ def _build_people(builder: EffectBuilder) -> None:
     names = ("internal_gain", "internal_gain_delay", "internal_gain_at_home", "base_load")
     peak, shift, home, base = (builder.parameter(n) for n in names)
     arrival = Signal("coming and going", "1/h", attrgetter("occupancy_rate"), ("occupancy_rate",))
+    served = {room.name for room in builder.rooms} <= builder.anatomy.served
+    elsewhere = 1.0 if served else builder.parameter("internal_gain_unserved_share")
     for value, signal in ((peak, PRESENCE), (-peak * shift, arrival), (home, AT_HOME), (base, CONSTANT)):
         for room in builder.rooms:
-            builder.heat_air(room, value, signal, 0.5 * room.floor_area)
-            builder.heat_surfaces(room, value, signal, 0.5 * room.floor_area)
+            own = value if room.name in builder.anatomy.served else value * elsewhere
+            builder.heat_air(room, own, signal, 0.5 * room.floor_area)
+            builder.heat_surfaces(room, own, signal, 0.5 * room.floor_area)
 
 
 def _build_latent(builder: EffectBuilder) -> None:
     load = builder.parameter("latent_load")
     for room in builder.rooms:
-        builder.heat_air(room, load, PRESENCE, -room.floor_area)
+        if room.name in builder.anatomy.served:
+            builder.heat_air(room, load, PRESENCE, -room.floor_area)
 
 
 def _no_walls(anatomy: Anatomy) -> str | None:

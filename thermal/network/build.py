@@ -237,6 +237,7 @@ def _drawn(
     graph, plans = GraphBuilder(building.zone_names, boundaries, scopes or {}, structure), building.geometry
     graph.quality = building.geometry_quality
     graph.anatomy.heated = {(e.zone, side): [] for e in emitters_of(building, structure.emitter) for side in e.sides}
+    graph.anatomy.served = frozenset(d.zone for d in building.devices if d.zone) or frozenset(building.zone_names)
     graph.anatomy.air_heat_capacity = air_density(building.location.elevation) * AIR_HEAT_CAPACITY
     place = graph.zones.index
     graph.anatomy.airflows = tuple((place(a.source), place(a.target)) for a in building.airflows)

@@ -230,6 +230,8 @@ class Anatomy:
         Whether the case tells its windows; some are assumed on every side of a plan without.
     rooms : dict of str to Room
         By zone.
+    served : frozenset of str
+        Zones that a device heats, cools or ventilates; all of them where no device says which it serves.
     partitions : dict
         Area between two zones of one floor, by their names in order [m2].
     stacked : dict
@@ -252,6 +254,7 @@ class Anatomy:
     panes: list[Pane] = field(default_factory=list)
     windows_told: bool = True
     rooms: dict[str, Room] = field(default_factory=dict)
+    served: frozenset[str] = frozenset()
     partitions: dict[tuple[str, str], float] = field(default_factory=dict)
     stacked: dict[tuple[str, str], float] = field(default_factory=dict)
     under_roof: dict[str, float] = field(default_factory=dict)

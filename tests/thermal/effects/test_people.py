@@ -1,0 +1,66 @@
+"""Where the heat of people goes in a building that has zones which nothing heats, cools or ventilates."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from thermal import Case, SymbolicModel, ThermalNetwork, build_network
+from thermal.case.building import Building
+from thermal.effects.catalogue import chosen
+from thermal.network.structure import Structure
+
+CaseOf = Callable[[str], Case]
+
+FLOOR = {"A": 20.0, "B": 16.0}  # m2
+
+
+def heat_by_zone(network: ThermalNetwork, signal: str, **values: float) -> dict[str, float]:
+    """Heat that enters each zone for a signal of 1, by the difference from no strength [W]."""
+    column = network.n_node + len(network.boundaries) + [s.name for s in network.signals].index(signal)
+    nothing, with_it = (
+        SymbolicModel(network).matrices(network.values(v)).flow.toarray()[: network.n_node, column]
+        for v in ({}, values)
+    )
+    heat = nothing - with_it
+    return {zone: float(heat[network.zone == k].sum()) for k, zone in enumerate(network.zones)}
+
+
+@pytest.fixture
+def building(lively_case: CaseOf) -> Building:
+    return lively_case("table").building
+
+
+@pytest.fixture
+def unserved(building: Building) -> Building:
+    """The same, with nothing in B."""
+    devices = tuple(d for d in building.devices if d.zone != "B")
+    assert "A" in {d.zone for d in devices} and len(devices) < len(building.devices)
+    return replace(building, devices=devices)
+
+
+def test_a_zone_without_a_device_has_a_share_of_peoples_heat(unserved: Building) -> None:
+    network = build_network(unserved, effects=chosen(["internal_gains"]))
+    for signal, name in (("presence", "internal_gain"), ("constant", "base_load")):
+        heat = heat_by_zone(network, signal, **{name: 5.0, "internal_gain_unserved_share": 0.3})
+        assert heat == pytest.approx({"A": 5.0 * FLOOR["A"], "B": 0.3 * 5.0 * FLOOR["B"]}, rel=1e-9)
+
+
+def test_there_is_no_share_where_every_zone_is_served_or_no_device_says_which(building: Building) -> None:
+    nobody = tuple(d for d in building.devices if d.zone is None)
+    for devices in (building.devices, nobody):
+        network = build_network(replace(building, devices=devices), effects=chosen(["internal_gains"]))
+        assert not any(p.name == "internal_gain_unserved_share" for p in network.parameters)
+        heat = heat_by_zone(network, "presence", internal_gain=5.0)
+        assert heat == pytest.approx({zone: 5.0 * area for zone, area in FLOOR.items()}, rel=1e-9)
+
+
+def test_moisture_is_seen_by_what_cools_the_air(unserved: Building) -> None:
+    network = build_network(unserved, effects=chosen(["latent_load"]))
+    assert heat_by_zone(network, "presence", latent_load=5.0) == pytest.approx({"A": -5.0 * FLOOR["A"], "B": 0.0})
+
+
+def test_the_lumped_model_knows_too(unserved: Building) -> None:
+    network = build_network(unserved, structure=Structure(lumped=True), effects=chosen(["internal_gains"]))
+    heat = heat_by_zone(network, "presence", internal_gain=5.0, internal_gain_unserved_share=0.3)
+    assert heat["B"] / heat["A"] == pytest.approx(0.3 * FLOOR["B"] / FLOOR["A"], rel=1e-9)
