@@ -115,8 +115,6 @@ class Diagnosis(Result):
         The baseline with heat of unknown cause, where no effect explains what is missing and such heat is certified.
     faults : tuple of Fault
         Of the telemetry, which were mended before anything else: all the rest is about the mended case.
-    recurring : Step or None
-        How far people's heat closes the gap where a structure holds it: `gap` is then the error that is left.
     """
 
     case: str
@@ -145,7 +143,6 @@ class Diagnosis(Result):
     left_over: Regular | None = None
     correction: Correction | None = None
     faults: tuple[Fault, ...] = ()
-    recurring: Step | None = None
 
     @property
     def final(self) -> Fit:
@@ -155,12 +152,7 @@ class Diagnosis(Result):
     @property
     def drawing_fails(self) -> bool:
         """Whether the drawing does not hold, so that effects were sought about a free structure."""
-        return self.settings.structure.lumped or self.settings.structure.recurring
-
-    @property
-    def all_steps(self) -> tuple[Step, ...]:
-        """How far each effect closes the gap, that which a structure holds first."""
-        return self.steps if self.recurring is None else (self.recurring, *self.steps)
+        return self.settings.structure.lumped
 
     @property
     def taken(self) -> Fit:
@@ -184,7 +176,7 @@ class Diagnosis(Result):
         return {
             "verdict": self.verdict.name,
             "gap": {
-                "mae": self.faults[0].before.held_out if self.faults else self.start,
+                "mae": self.faults[0].before.held_out if self.faults else self.gap,
                 "floor": self.floor,
                 "p_value": self.p_value,
                 "smallest_detectable_watts": self.detectable,
@@ -207,7 +199,7 @@ class Diagnosis(Result):
                           "kind": w.drift.kind},
                 "groups": {s.name: s.to_dict() for s in w.groups},
             },
-            **answer_entries(self.verdict, self.all_steps, self.rounds, self.faults, self.floor),
+            **answer_entries(self.verdict, self.steps, self.rounds, self.faults, self.floor),
             **({} if self.left_over is None else {"left_over": plain(self.left_over)}),
             "correction": None if self.correction is None else self.correction.to_dict(),
             "prediction": {"rungs": plain(self.rungs), "held_out_mae": self.predicts, "carried": plain(carried)},
@@ -219,11 +211,6 @@ class Diagnosis(Result):
             **{key: getattr(self, key) for key in ("seconds", "case", "version", "seed")},
             **estimate_entry(self.estimated),
         }  # fmt: skip
-
-    @property
-    def start(self) -> float:
-        """Held-out error of the calibrated baseline before heat was found that a structure holds [K]."""
-        return self.gap if self.recurring is None else self.recurring.before
 
     @property
     def predicts(self) -> float:
@@ -350,7 +337,7 @@ def diagnose(
         settings=replace(models.settings, normalisation=models.drivers.normalisation), horizon=horizon,
         last_third=found.last_third, rungs=rungs, better=better, prediction=prediction,
         estimated=found.case.estimated, disturbance=disturbance, band_factors=factors,
-        left_over=found.left_over, correction=correction, faults=found.faults, recurring=found.recurring,
+        left_over=found.left_over, correction=correction, faults=found.faults,
     )  # fmt: skip
 
 

@@ -9,11 +9,11 @@ from calibration.diagnosis.decide.name import VerdictName
 from calibration.diagnosis.decide.verdict import Verdict
 from calibration.diagnosis.known import reasons_of
 from calibration.diagnosis.refit.comparison import Effects, Fit, ModelComparison
-from calibration.diagnosis.refit.refit import HeldOut, beyond_a_step, held_out
+from calibration.diagnosis.refit.refit import beyond_a_step, held_out
 from calibration.diagnosis.refit.search import Round, search
 from calibration.diagnosis.screen.regular import Regular, regular
 from calibration.fit.fitted_case import FittedCase, fit_case
-from calibration.fit.ladder import ADVANCE, CLOCK, RECURRING, STEADY
+from calibration.fit.ladder import ADVANCE, CLOCK, GAINS
 from calibration.fit.left_out import Known, left_out, values_of
 from calibration.fit.result import Rung
 from calibration.progress import Forward, Progress
@@ -27,8 +27,8 @@ from thermal.network.structure import Structure
 #: to 90.
 FAILS = 0.2
 
-#: Names of a gain that recurs, and of the sun.
-GAINS, SUN = "internal_gains", "solar_gain"
+#: Name of the sun, and of a structure with what was found.
+SUN, FOUND = "solar_gain", "found"
 
 #: Share of the lumped structure's error on left-out days below which a gain that recurs in each zone has a name [-]: on
 #: development seeds of houses and EnergyPlus' reference buildings 0.44, 0.54 and 0.84 where people's heat is missing,
@@ -52,10 +52,9 @@ class Free:
     left_over : Regular
         What comes back of the errors of its last model.
     kept : FittedCase
-        The structure, with the effects that were accepted unless it predicts clearly better by itself.
-    without : HeldOut or None
-        Errors without its gain that recurs: of the drawing as calibrated, or of the lumped model; None where it has
-        none, or somebody said of people's heat that it is there, or not.
+        The structure with the effects that were accepted, unless it predicts clearly better by itself.
+    rungs : tuple of Rung
+        Structures by their errors, and this one with the effects.
     """
 
     models: ModelComparison
@@ -63,7 +62,7 @@ class Free:
     untestable: dict[str, str]
     left_over: Regular
     kept: FittedCase
-    without: HeldOut | None = None
+    rungs: tuple[Rung, ...]
 
 
 def held_against(rounds: Sequence[Round], quality: GeometryQuality) -> tuple[Fit, ...]:
@@ -93,7 +92,7 @@ def drawing_fails(rungs: Sequence[Rung], kept: FittedCase | None) -> bool:
     kept : FittedCase or None
         What predicts left-out days best, where that is not the first.
     """
-    if kept is None or not (kept.settings.structure.lumped or kept.settings.structure.recurring):
+    if kept is None or not kept.settings.structure.lumped:
         return False
     return next(r for r in rungs if r.chosen).left_out_mae < (1.0 - FAILS) * rungs[0].left_out_mae
 
@@ -109,8 +108,6 @@ def recurs(rungs: Sequence[Rung]) -> tuple[float, float] | None:
         Structures by their errors.
     """
     errors = {r.name: r.left_out_mae for r in rungs}
-    if any(r.chosen and r.name == RECURRING for r in rungs):
-        return errors[STEADY], errors[RECURRING]
     without, with_it = errors.get("lumped"), errors.get("recurring")
     if without is None or with_it is None or with_it > _RECURS * without:
         return None
@@ -159,7 +156,7 @@ def is_recurring(verdict: Verdict) -> bool:
 
 def search_free(
     models: ModelComparison,
-    drawing: HeldOut,
+    rungs: tuple[Rung, ...],
     kept: FittedCase,
     known: Sequence[str] = (),
     ruled_out: Sequence[str] = (),
@@ -170,15 +167,16 @@ def search_free(
     How many independent errors it has is what its calibration found of their correlation. The errors of a building that
     people live in are larger than those of an office whose heat is all metered, so that only what comes back counts as
     left over. What the structure itself has found and the catalogue has a name for is sought by its name: the sun, a
-    gain that recurs from day to day, and weather that is moved by more than a step of the telemetry. What is named is
-    handed on unless the structure without names predicts left-out days better by a tenth: its sun has apertures.
+    gain that recurs from day to day, and weather that is moved by more than a step of the telemetry, until one is
+    found. What is named is handed on unless the structure alone predicts left-out days better by a tenth: its sun has
+    apertures.
 
     Parameters
     ----------
     models : ModelComparison
         The case as drawn, with its days.
-    drawing : HeldOut
-        Errors of the drawing as calibrated.
+    rungs : tuple of Rung
+        Structures by their errors.
     kept : FittedCase
         The free structure.
     known, ruled_out : sequence of str
@@ -193,11 +191,10 @@ def search_free(
     moved = beyond_a_step(found.problem, found.theta, np.sqrt(np.diag(found.covariance)), CATALOGUE[CLOCK].shifts)
     if CLOCK in chosen.effects and CLOCK not in said and moved:
         attempts.insert(0, (whole, {e: z for e, z in chosen.effects.items() if e != CLOCK}, CLOCK))
-    if whole.lumped and whole.recurring and GAINS not in said:
+    if whole.recurring and GAINS not in said:
         attempts.insert(0, (replace(whole, recurring=False), chosen.effects, GAINS))
     if whole.sun and SUN not in said:
         attempts.insert(0, (replace(whole, sun=False), chosen.effects, SUN))
-    without = drawing if whole.recurring and not whole.lumped and GAINS not in said else None
     for structure, own, sought in attempts:
         settings = replace(
             models.settings, structure=structure, scopes=chosen.scopes, normalisation=chosen.normalisation
@@ -209,9 +206,7 @@ def search_free(
         untestable |= reasons_of(known, ruled_out, untestable) | dict.fromkeys(own, "part of the structure")
         testable = [e for e in CATALOGUE if e not in untestable]
         baseline = free.fit({**own, **{e: () for e in known}}, [values_of(found)])
-        errors = held_out(free, baseline)
-        without = errors if sought == GAINS else without
-        rounds = search(free, baseline, errors, testable, ahead.part(0.5))
+        rounds = search(free, baseline, held_out(free, baseline), testable, ahead.part(0.5))
         final = rounds[-1].after
         if sought is None or sought in final.effects:
             break
@@ -219,7 +214,10 @@ def search_free(
         known_fit = Known(final.problem, final.model, final.point)
         further = replace(chosen, structure=structure, effects=dict(final.effects))
         named = fit_case(models.case, models.tuned, models.judged, further, ahead.part(1.0), known_fit)
-        named = replace(named, left=left_out(named.best, models.tuned, further.spin_up_seconds))
-        if kept.left is None or named.left is None or not kept.left.mae < (1.0 - ADVANCE) * named.left.mae:
-            kept = named
-    return Free(free, rounds, untestable, regular(free, final), kept, without)
+        left = left_out(named.best, models.tuned, further.spin_up_seconds)
+        named, alone = replace(named, left=left), kept.left
+        better = alone is not None and alone.mae < (1.0 - ADVANCE) * left.mae
+        rungs = tuple(replace(r, chosen=r.chosen and better) for r in rungs)
+        rungs += (Rung(FOUND, left.mae, len(named.best.problem.free), not better),)
+        kept = kept if better else named
+    return Free(free, rounds, untestable, regular(free, final), kept, rungs)

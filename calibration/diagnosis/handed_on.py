@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from calibration.diagnosis.correction import CORRECTED, Correction
-from calibration.diagnosis.refit.comparison import Fit, ModelComparison
+from calibration.diagnosis.refit.comparison import Effects, Fit, ModelComparison
 from calibration.estimation.bands import Forecaster
 from calibration.estimation.disturbance import DisturbanceModel
 from calibration.evaluation.intervals import Interval
@@ -22,7 +22,11 @@ from calibration.progress import Progress
 
 
 def other_structures(
-    models: ModelComparison, final: Fit, progress: Progress | None, advance: float
+    models: ModelComparison,
+    final: Fit,
+    progress: Progress | None,
+    advance: float,
+    beside: Sequence[Effects] = (),
 ) -> tuple[tuple[Rung, ...], FittedCase | None, LeftOut | None]:
     """Fit other structures beside the final model, unless the building is large.
 
@@ -36,6 +40,8 @@ def other_structures(
         Called with stage, done, total.
     advance : float
         Share by which another's error on left-out days must be less [-].
+    beside : sequence of mapping of str to sequence of str
+        Effects beside which the heat of people with hours of their own is tried; it is not by default.
 
     Returns
     -------
@@ -45,7 +51,7 @@ def other_structures(
     if is_large(final.built.network.zones):
         return (), None, None
     name = "named" if final.effects else "drawn"
-    return climb_from(name, Known(final.weighed, final.model, final.point), models, progress, advance)
+    return climb_from(name, Known(final.weighed, final.model, final.point), models, progress, advance, beside)
 
 
 def with_correction(

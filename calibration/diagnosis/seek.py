@@ -11,28 +11,21 @@ from typing import Any, NamedTuple
 from calibration.diagnosis.baseline import fit_baseline
 from calibration.diagnosis.decide.verdict import Verdict, doubted, gains_of, judge, summarised
 from calibration.diagnosis.faults import LEAST, Fault, mend, with_faults
-from calibration.diagnosis.free import (
-    GAINS,
-    Free,
-    drawing_fails,
-    held_against,
-    is_recurring,
-    search_free,
-    with_recurring,
-)
+from calibration.diagnosis.free import Free, drawing_fails, held_against, search_free, with_recurring
 from calibration.diagnosis.handed_on import other_structures
 from calibration.diagnosis.known import reasons_of
+from calibration.diagnosis.people import finds_people, with_people
 from calibration.diagnosis.refit.challenge import challenge
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
-from calibration.diagnosis.refit.how_far import Step, how_far, step_by_structure
+from calibration.diagnosis.refit.how_far import Step, how_far
 from calibration.diagnosis.refit.refit import HeldOut, elsewhere, held_out
 from calibration.diagnosis.refit.search import Round, search
 from calibration.diagnosis.screen.regular import Regular, regular
 from calibration.evaluation.intervals import Interval
 from calibration.evaluation.settings import ModelSettings
 from calibration.fit.fitted_case import FittedCase, is_large
-from calibration.fit.ladder import ADVANCE
-from calibration.fit.left_out import LeftOut
+from calibration.fit.ladder import ADVANCE, GAINS
+from calibration.fit.left_out import Known, LeftOut, left_out
 from calibration.fit.result import Rung
 from calibration.progress import Forward, Progress
 from calibration.results import plain
@@ -85,9 +78,6 @@ class Sought:
         that was accepted is named, or whether errors that are merely large say that something is missing.
     last_third : float or None
         As in `Diagnosis` [K].
-    recurring : Step or None
-        How far people's heat closes the gap where it recurs in each zone with a course of its own, so that a structure
-        holds it.
     faults : tuple of Fault
         Of the telemetry, which were mended before anything else.
     seconds : float
@@ -103,7 +93,6 @@ class Sought:
     free: Free | None
     left_over: Regular | None
     last_third: float | None
-    recurring: Step | None = None
     faults: tuple[Fault, ...] = ()
     seconds: float = field(default=0.0, compare=False)
 
@@ -120,21 +109,14 @@ class Sought:
     @property
     def gap(self) -> float:
         """Held-out mean absolute error of the calibrated baseline, before faults were mended [K]."""
-        if self.faults:
-            return self.faults[0].before.held_out
-        return self.rounds[0].held_out.mae if self.recurring is None else self.recurring.before
-
-    @property
-    def all_steps(self) -> tuple[Step, ...]:
-        """How far each effect closes the gap, that which a structure holds first."""
-        return self.steps if self.recurring is None else (self.recurring, *self.steps)
+        return self.faults[0].before.held_out if self.faults else self.rounds[0].held_out.mae
 
     def to_dict(self) -> dict[str, Any]:
         """Entries of ``diagnosis.json`` that tell the answer."""
         return {
             "verdict": self.verdict.name,
             "gap": {"mae": self.gap, "floor": self.floor.mae},
-            **answer_entries(self.verdict, self.all_steps, self.rounds, self.faults, self.floor.mae),
+            **answer_entries(self.verdict, self.steps, self.rounds, self.faults, self.floor.mae),
             "intervals": {"mae_of_last_third": self.last_third},
             "seconds": self.seconds,
         }
@@ -236,12 +218,9 @@ def _seek(drawn: ModelComparison, known: Sequence[str], ruled_out: Sequence[str]
     models, rounds, untestable, structures, free, left_over = about
     steps, floor = how_far(models, rounds)
     verdict = doubted(judge(rounds, untestable, left_over), {s.effects[-1] for s in steps if s.void})
-    recurring = None
     if free is not None and structures is not None:
         verdict = with_recurring(verdict, free, structures.rungs)
-        if free.without is not None and is_recurring(verdict):
-            recurring = step_by_structure(GAINS, free.without, rounds[0], floor)
-    return Sought(models, rounds, verdict, steps, floor, structures, free, left_over, last_third, recurring)
+    return Sought(models, rounds, verdict, steps, floor, structures, free, left_over, last_third)
 
 
 def _begin(
@@ -277,15 +256,32 @@ def _other_structures(about: _About, known: Sequence[str], ruled_out: Sequence[s
     # a drawing that is known to lack what nothing explains has no advance
     advance = 0.0 if unexplained else ADVANCE
     for fit in held_against(rounds, case.building.geometry_quality):
-        structures = Structures(*other_structures(models, fit, whole.part(0.5), advance))
+        given, all_found = rounds[0].before.effects, fit.effects
+        beside = () if GAINS in ruled_out else (given,) if all_found.keys() == given.keys() else (given, all_found)
+        structures = Structures(*other_structures(models, fit, whole.part(0.5), advance, beside))
         about = about._replace(structures=structures)
+        if structures.kept is not None and finds_people(structures.kept):
+            return _beside_people(about, structures, structures.kept, whole)
         if structures.kept is not None and drawing_fails(structures.rungs, structures.kept):  # names make up for it
-            errors = rounds[0].held_out
-            free = search_free(models, errors, structures.kept, known, ruled_out, whole.part(0.6, "free structure"))
-            structures = structures._replace(kept=free.kept)
+            part = whole.part(0.6, "free structure")
+            free = search_free(models, structures.rungs, structures.kept, known, ruled_out, part)
+            structures = Structures(free.rungs, free.kept, free.kept.left or structures.left)
             return _About(free.models, free.rounds, free.untestable, structures, free, free.left_over)
     if unexplained and (rounds[0].accepted or alone) and not is_large(case.building.zone_names):
         left_over = regular(models, rounds[-1].after)
         if rounds[0].accepted or not left_over.matters:  # large errors of which nothing comes back are by chance
             return about._replace(left_over=left_over)
     return about
+
+
+def _beside_people(about: _About, structures: Structures, kept: FittedCase, whole: Forward) -> _About:
+    """Seek what else is missing beside people who have hours of their own in each zone."""
+    models = about.models
+    rounds, found = with_people(models, about.rounds, kept)
+    testable = [e for e in CATALOGUE if e not in about.untestable]
+    rounds += search(models, found.fit, found.held_out, testable, whole.part(0.6, "beside people's heat"))
+    final = rounds[-1].after
+    left = left_out(Known(final.weighed, final.model, final.point), models.tuned, models.settings.spin_up_seconds)
+    unexplained = judge(rounds, about.untestable).name == "unexplained"
+    left_over = regular(models, final) if unexplained else None
+    return about._replace(rounds=rounds, structures=structures._replace(kept=None, left=left), left_over=left_over)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Protocol
 
 from calibration.evaluation.intervals import Interval, days_of
@@ -18,6 +19,7 @@ from calibration.stages import stage
 from thermal.case.case import Case
 from thermal.case.emitters import Unknown, unknown_heaters
 from thermal.inputs.provider import telemetry_inputs
+from thermal.inputs.signals import DAILY
 from thermal.model.reduce import reduced_model
 from thermal.network.structure import BASELINE, Structure
 from thermal.parameters import Scope
@@ -50,11 +52,14 @@ _EMITTERS: tuple[Unknown, Unknown] = ("floor", "radiator")
 #: Tuning days from which a gain that recurs from day to day is looked for [days]: it has to recur.
 _WEEK = 7.0
 
-#: A drawing with heat in each zone that is always there, and with heat that recurs from day to day too.
-STEADY, RECURRING = "steady", "drawn recurring"
+#: A drawing whose people have hours of their own in each zone, and one that has what was found beside them.
+PEOPLE, BESIDE = "people", "people beside"
 
-#: Share of the former's error on left-out days below which the latter is kept [-]: it has seven numbers a zone.
-RECURS = 0.75
+#: Heat of people, and what its course is made of.
+GAINS, _WAVE = "internal_gains", "internal_gain_wave"
+
+#: Share of the error on left-out days of a drawing with the means of that heat below which its course counts [-].
+_RECURS = 0.75
 
 
 def climb(drawn: FittedCase, began: float, progress: Progress | None = None) -> CalibrationResult:
@@ -144,7 +149,12 @@ class Tuned(Protocol):
 
 
 def climb_from(
-    name: str, fitted: Fitted, given: Tuned, progress: Progress | None = None, advance: float = ADVANCE
+    name: str,
+    fitted: Fitted,
+    given: Tuned,
+    progress: Progress | None = None,
+    advance: float = ADVANCE,
+    beside: Sequence[Mapping[str, Sequence[str]]] = (MappingProxyType({}),),
 ) -> tuple[tuple[Rung, ...], FittedCase | None, LeftOut]:
     """Fit further structures beside a fitted model; the simplest is kept that predicts left-out days about best.
 
@@ -152,7 +162,8 @@ def climb_from(
     films that follow the wind, and with slabs and furniture by zone, unless a lumped model halves the drawing's error;
     lumped, where the sun is a part of it, by an estimate if irradiance is not measured; lumped, with a gain that recurs
     from day to day, which is linear, so that a few Newton steps from the lumped estimate tell whether it is worth a
-    fit; lumped with floors that are heated, where the drawing has them or lumped alone is better than any drawing; and
+    fit; as drawn with the heat of people who have hours of their own in each zone, looked at in the same way;
+    lumped with floors that are heated, where the drawing has them or lumped alone is better than any drawing; and
     where one of these is kept, with heat and weather moved in time.
 
     Parameters
@@ -167,6 +178,9 @@ def climb_from(
         Called with stage, done, total.
     advance : float
         Share by which another's error must be less than the fitted model's [-].
+    beside : sequence of mapping of str to sequence of str
+        Effects beside which the heat of people is tried, with their zones: those that are known, and all that the
+        fitted model has where it has others.
 
     Returns
     -------
@@ -185,6 +199,7 @@ def climb_from(
         best = _best(looked, advance)
         if (found := looked[best].fit) is not None:
             base, fitted = found.settings, found.best
+    people = ladder.people(base, fitted, beside, (1.0 - advance) * looked[best].left.mae)
     free = ladder.lumped(Structure(lumped=True, sun=source.gives("sun")), looked[best].left.mae)
     drawn = min(each.left.mae for each in free) >= _WRONG * looked[best].left.mae
     if plain and drawn and source.gives("wind"):
@@ -196,10 +211,8 @@ def climb_from(
     scopes: dict[str, Scope] = {p.base: "zone" for p in parameters if p.base in MASSES}
     if scopes and plain and drawn and not base.scopes and len(fitted.model.network.zones) > 1:
         looked.append(ladder.fitted("zoned", replace(base, scopes={**base.scopes, **scopes}), fitted))
+    looked += people + free
     lumped = free[_best(free, ADVANCE)].fit
-    if days_of(given.tuned) >= _WEEK:
-        looked += ladder.gains(base, fitted, (1.0 - advance) * looked[0].left.mae)
-    looked += free
     if lumped is not None and days_of(given.tuned) >= _WEEK:
         recurring = replace(lumped.settings, structure=replace(lumped.settings.structure, recurring=True))
         begun["recurring"] = recurring, lumped.best
@@ -297,21 +310,26 @@ class _Ladder:
             return [seen]
         return [self.fitted("radiator", radiator), seen]
 
-    def gains(self, base: CalibrationSettings, fitted: Fitted, error: float) -> list[_Looked]:
-        """Fit a drawing with heat that recurs from day to day, beside one whose unknown heat is always there.
+    def people(
+        self, base: CalibrationSettings, fitted: Fitted, beside: Sequence[Mapping[str, Sequence[str]]], error: float
+    ) -> list[_Looked]:
+        """Fit the heat of people who have hours of their own in each zone, beside some effects and beside others.
 
-        Nothing unless it takes much of the other's error away, and predicts days that were left out better than an
-        error: what is missing differs from people's heat, and a drawing that is wrong takes all the freedom it gets.
+        Nothing unless left-out days are predicted better than by an error, and much better than by the means of such
+        heat: a wrong drawing takes any freedom that it gets, but has no course of the day.
         """
-        looks = [
-            (name, replace(base, structure=replace(base.structure, steady=True, recurring=name == RECURRING)))
-            for name in (STEADY, RECURRING)
-        ]
-        always, daily = (self.look(name, _begun(self.given, given, fitted)) for name, given in looks)
-        if not daily.left.mae < min(error, RECURS * always.left.mae):
-            return []
-        always, daily = (self.fitted(name, given, fitted) for name, given in looks)
-        return [always, daily] if daily.left.mae < RECURS * always.left.mae else []
+        zones, found = self.given.case.building.zone_names, []
+        waves = {f"{_WAVE}@{zone}, {wave.name}": 0.0 for zone in zones for wave in DAILY}
+        for name, others in zip((PEOPLE, BESIDE), beside, strict=False):
+            if GAINS in (*base.effects, *others) or days_of(self.given.tuned) < _WEEK:
+                continue
+            daily = replace(base, effects={**base.effects, **others, GAINS: zones})
+            looks = [replace(daily, fixed={**base.fixed, **fixed}) for fixed in (waves, {})]
+            always, course = (self.look(name, _begun(self.given, settings, fitted)) for settings in looks)
+            if course.left.mae < min(error, _RECURS * always.left.mae):
+                always, course = (self.fitted(name, settings, fitted) for settings in looks)
+                found += [course] if course.left.mae < _RECURS * always.left.mae else []
+        return found
 
     def lumped(self, structure: Structure, error: float) -> list[_Looked]:
         """Fit a lumped model, and one with heated floors if the drawing has them, or if they promise anything.

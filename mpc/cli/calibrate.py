@@ -271,6 +271,6 @@ def _show_diagnosis(result: Diagnosis) -> None:
     untestable = [s.effect for s in candidates if not s.testable]
     if untestable:
         say(f"These data cannot test: {', '.join(untestable)}; the report says why.")
-    steps = [(f"+ {step.effects[-1]}", step.after, step.share_closed) for step in result.all_steps]
-    errors = [("calibrated model", result.start, ""), *steps, ("floor", result.floor, "")]
+    steps = [(f"+ {step.effects[-1]}", step.after, step.share_closed) for step in result.steps]
+    errors = [("calibrated model", result.gap, ""), *steps, ("floor", result.floor, "")]
     show_table(f"Held-out error {result.horizon} ahead", {"": "", "MAE [K]": ".3f", "share closed": "percent"}, errors)

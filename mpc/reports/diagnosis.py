@@ -12,6 +12,7 @@ from calibration.diagnosis.decide.verdict import Candidate, generic_from
 from calibration.diagnosis.diagnosis import Diagnosis, Replay
 from calibration.diagnosis.posterior import posterior_of
 from calibration.diagnosis.refit.search import Round, accepted_from
+from calibration.fit.ladder import GAINS
 from calibration.results import Content, check_results_folder
 from mpc.reports import diagnosis_words
 from mpc.reports.correction_words import correction_sentence, driver_rows
@@ -26,9 +27,11 @@ from mpc.reports.figures.style import CELSIUS, Picture
 from mpc.reports.means_found import diagnosis_means
 from mpc.reports.page import kelvin, listed, render, significant, sure, unit
 from mpc.reports.warnings import case_warnings, windows_first
+from thermal._types import FloatArray
 from thermal.case.building import FloorPlans
 from thermal.case.case import Case
 from thermal.effects.catalogue import CATALOGUE
+from thermal.effects.gains import daily_course
 
 #: Models of a diagnosis in its tables.
 _MODELS = ("baseline", "with_effects")
@@ -214,11 +217,25 @@ def _candidate_entry(result: Diagnosis, c: Candidate) -> dict[str, Any]:
     }
 
 
+def _courses(by_zone: Mapping[str, FloatArray]) -> list[str]:
+    """Spell the heat of people with hours of their own, the zones in which it swings most first."""
+    most = sorted(by_zone, key=lambda zone: -float(np.ptp(by_zone[zone])))
+    told = [
+        f"{zone}: {significant(by_zone[zone].mean(), 2)} W/m² in the mean, most at {int(np.argmax(by_zone[zone]))}:00 "
+        f"({significant(by_zone[zone].max(), 2)})"
+        for zone in most[:_MOST_VALUES]
+    ]
+    more = len(most) - _MOST_VALUES
+    return [*told, f"and {more} more"] if more > 0 else told
+
+
 def _values(result: Diagnosis, effect: str) -> list[str]:
     """Spell the parameters of an effect as the final model has them."""
     if effect not in CATALOGUE:
         return []
     own = {p.name for p in CATALOGUE[effect].parameters}
+    if effect == GAINS and (zones := result.final.effects.get(effect)):
+        return _courses({zone: daily_course(zone, result.final.values) for zone in zones})
     found = [p for p in result.final.describe() if p.name.partition("@")[0] in own]
     spelled = []
     for p in found[:_MOST_VALUES]:
@@ -251,11 +268,10 @@ def _measure_next(result: Diagnosis) -> list[tuple[str, str]]:
 
 def _waterfall(result: Diagnosis) -> list[tuple[str, float, float]]:
     """List held-out errors, from the baseline by each effect to the floor, each with the one before."""
-    values = [result.start, *(s.after for s in result.all_steps)]
-    ends = zip(result.all_steps, values, strict=False)
-    steps = [(f"+ {called(s.effects[-1])}", s.after, before) for s, before in ends]
+    values = [result.gap, *(s.after for s in result.steps)]
+    steps = [(f"+ {called(s.effects[-1])}", s.after, before) for s, before in zip(result.steps, values, strict=False)]
     floor = ("Floor: with regular heat of any kind added", result.floor, result.floor)
-    return [("The calibrated model", result.start, result.start), *steps, floor]
+    return [("The calibrated model", result.gap, result.gap), *steps, floor]
 
 
 def _test_sentences(result: Diagnosis) -> list[str]:
@@ -331,7 +347,7 @@ def _statistics(result: Diagnosis) -> dict[str, Any]:
             | ({} if c.testable else nothing | {"sure": "not testable"})
             for c in result.verdict.candidates
         ],
-        "closed": [vars(s) | {"names": listed([called(e) for e in s.effects])} for s in result.all_steps],
+        "closed": [vars(s) | {"names": listed([called(e) for e in s.effects])} for s in result.steps],
         "parameters": [vars(p) | {"first": first.get(p.name)} for p in final.values() if p.standard_error is not None],
         "bounds": [[n.replace("_", " ") for n, p in fit.items() if p.at_bound] or ["none"] for fit in (first, final)],
         "alternating": diagnosis_words.alternating_sentence(result),

@@ -2,15 +2,12 @@
 
 from dataclasses import replace
 
-import numpy as np
-
 from calibration.diagnosis.correction import CORRECTED
 from calibration.diagnosis.diagnosis import Diagnosis
-from calibration.diagnosis.free import GAINS, is_recurring, recurs
+from calibration.diagnosis.free import FOUND, is_recurring, recurs
 from calibration.fit.ladder import CLOCK
 from mpc.reports.evaluation import structure_words
-from mpc.reports.page import kelvin, listed, sure, watts
-from thermal.network.gains import daily_gains
+from mpc.reports.page import kelvin, listed
 
 #: Share of the squared error from which a kind of heat is named [-], and most kinds that are.
 _SHOWN, _MOST = 0.05, 2
@@ -30,30 +27,27 @@ def free_sentence(result: Diagnosis) -> str:
     best = min(others, key=lambda r: r.left_out_mae)
     free = [replace(r, chosen=r is best) for r in others] if len(others) < len(result.rungs) else others
     own, drawn = next(r.left_out_mae for r in free if r.chosen), result.rungs[0].left_out_mae
-    lumped, people = result.settings.structure.lumped, _recurring_sentence(result)
-    drawing = (
-        f"{'The drawing does not hold: the' if lumped else 'The'} building {structure_words(free)} misses tuning days "
-        f"that were left out by {kelvin(own)} K, as drawn by {kelvin(drawn)} K."
-        f"{' calibration.json holds it, and effects' if free is others else ' Effects'} were sought about it. "
-    )
-    return drawing + people if lumped else people + drawing
-
-
-def _recurring_sentence(result: Diagnosis) -> str:
-    """Say what people's heat does where a structure holds it, and where it swings most; nothing otherwise."""
     found = recurs(result.rungs) if is_recurring(result.verdict) else None
-    if found is None:
-        return ""
-    chance = sure(next(c.probability for c in result.verdict.candidates if c.effect == GAINS))
-    courses = {zone: daily_gains(zone, result.final.values) for zone in result.final.built.network.zones}
-    zone = max(courses, key=lambda z: float(np.ptp(courses[z])))
-    swing, hour = watts(float(np.ptp(courses[zone]))), int(np.argmax(courses[zone]))
-    return (
+    gains = "" if found is None else (
         "Heat that recurs from day to day, with a course of its own in each zone, is missing: most likely people and "
-        f"what they use ({chance} sure). It lowers the error of tuning days that were left out from {kelvin(found[0])} "
-        f"to {kelvin(found[1])} K. It swings most in zone {zone}, by {swing} per m² of floor, and is largest at "
-        f"{hour}:00. "
+        f"what they use. It lowers the error of those days from {kelvin(found[0])} to {kelvin(found[1])} K. "
+    )  # fmt: skip
+    drawing = "as drawn with what was found" if result.rungs[0].name == "named" else "as drawn"
+    return (
+        f"The drawing does not hold: the building {structure_words(free)} misses tuning days that were left "
+        f"out by {kelvin(own)} K, {drawing} by {kelvin(drawn)} K."
+        f"{' calibration.json holds it, and effects' if free is others else ' Effects'} were sought about it. "
+        f"{_in_its_place(result)}{gains}"
     )
+
+
+def _in_its_place(result: Diagnosis) -> str:
+    """Say what a structure errs by with what was found in place of its own, where it is not what is handed on."""
+    named = next((r for r in result.rungs if r.name == FOUND and not r.chosen), None)
+    return "" if named is None else (
+        "With what was found, below, in the place of what that structure has itself, such as apertures for the sun, it "
+        f"misses those days by {kelvin(named.left_out_mae)} K. "
+    )  # fmt: skip
 
 
 def comes_back(result: Diagnosis) -> str:
@@ -82,5 +76,5 @@ def known_effects(result: Diagnosis) -> list[str]:
     result : Diagnosis
         From `diagnose`.
     """
-    moved = result.drawing_fails and any(r.chosen and r.name == "shifted" for r in result.rungs)
+    moved = result.drawing_fails and any(r.name == "shifted" for r in result.rungs)
     return [e for e in result.rounds[0].before.effects if not (moved and e == CLOCK)]

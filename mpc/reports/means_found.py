@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from calibration.diagnosis.diagnosis import Diagnosis
-from calibration.diagnosis.free import GAINS
 from calibration.evaluation.n_step import Evaluation
 from calibration.experiment.design import Experiment
 from calibration.experiment.outcome import Outcome
@@ -36,13 +35,13 @@ def diagnosis_means(result: Diagnosis) -> Means:
         first = result.faults[0].seen
         answer = f"The measurements themselves are wrong: {first.what}."
         return Means(answer, "All that follows is about the data with that put right.", f"{_sentence(first.advice)}")
-    if result.recurring is not None and not found:
-        before, after = kelvin(result.recurring.before), kelvin(result.recurring.after)
-        answer = "The plain model lacks heat that comes back every day at hours of its own in each room: most likely "
-        answer += "people and what they use."
-        trust = f"On days that it had not seen, the model's error falls from {before} to {after} degrees C with it."
-        use = "Use the model that has it, calibration.json, to predict and to control (buildingmpc compare)."
-        return Means(answer, trust, f"{use} To be sure of the cause, look at: {CATALOGUE[GAINS].separated_by}.")
+    if name == "named" and not found:  # a structure holds it
+        best = result.verdict.candidates[0]
+        answer = f"The plain model lacks {called(best.effect)}, at hours of its own in each zone."
+        trust = f"It is {sure(best.probability)} sure. With it the model misses by {kelvin(result.gap)} degrees C "
+        trust += f"{ahead(result)}, on days that it had not seen."
+        use = "Use calibration.json, which has it, to predict and to control (buildingmpc compare)."
+        return Means(answer, trust, use)
     if name == "no_gap" or (not found and name != "unexplained"):
         answer = "Nothing: the model explains this building as well as these data can show."
         trust = f"It misses by {kelvin(result.gap)} degrees C {ahead(result)}, on days that it had not seen. Small "
@@ -74,7 +73,8 @@ def diagnosis_means(result: Diagnosis) -> Means:
     elif last is not None:
         trust += " But on days that it had not seen the error does not fall, so do not rely on it yet."
     advice = CATALOGUE[effects[0][0]].separated_by if effects[0][0] in CATALOGUE else ""
-    use = "Use the model that has it, calibration.json, to predict and to control (buildingmpc compare)."
+    held = "a model that has" if result.better is None else "what predicts best with"
+    use = f"Use calibration.json, {held} it, to predict and to control (buildingmpc compare)."
     return Means(answer, trust, f"{use} To be sure of the cause, look at: {advice}." if advice else use)
 
 

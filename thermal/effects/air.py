@@ -3,7 +3,8 @@
 import numpy as np
 
 from thermal._types import FloatArray
-from thermal.effects.effect import PAIR, EffectBuilder, described, lacking, paired, without_facades
+from thermal.effects.effect import PAIR, EffectBuilder, described, lacking, without_facades
+from thermal.effects.weights import paired
 from thermal.inputs.provider import InputProvider
 from thermal.inputs.signals import Signal, of_zone
 from thermal.network.topology import Room

@@ -7,17 +7,13 @@ from importlib.resources import files
 from typing import Any
 
 import casadi as ca
-import numpy as np
 
-from thermal._types import FloatArray, IntArray
 from thermal.errors import EffectError, nearest
 from thermal.inputs.provider import InputProvider
 from thermal.inputs.signals import Signal
 from thermal.network.graph import GraphBuilder
 from thermal.network.topology import Anatomy, Emission, Room
 from thermal.parameters import Parameter
-
-_Part = tuple[IntArray, FloatArray]
 
 #: Adds an effect to a graph, in some of its zones (all of them when there are none).
 Builder = Callable[["EffectBuilder"], None]
@@ -60,6 +56,8 @@ class Effect:
         Point types of the weather station that it cannot do without.
     zonal : bool
         Whether it may be there in some zones only; it then has a strength a zone.
+    courses : bool
+        Whether it has a course of its own in each zone that is named; without zones it follows a schedule everywhere.
     alike : bool
         Whether one cause may give all zones one strength: cold water, a meters' factor. Valves leak one by one.
     requires : tuple of str
@@ -89,6 +87,7 @@ class Effect:
     build: Builder
     needs: tuple[str, ...] = ()
     zonal: bool = False
+    courses: bool = False
     alike: bool = False
     requires: tuple[str, ...] = ()
     applies: Callable[[Anatomy], str | None] | None = None
@@ -159,11 +158,11 @@ class Chosen:
         if unknown:
             known = nearest(unknown[0], graph.zones)
             raise EffectError(f"effect {self.effect.id}: zones {unknown} are not of this building; {known}")
-        if self.zones and not self.effect.zonal:
+        if self.zones and not (self.effect.zonal or self.effect.courses):
             found = f"zones {list(self.zones)}; leave them out"
             raise EffectError(f"effect {self.effect.id}: acts on the whole building, got {found}")
         zones = graph.zones if alike or not self.zones else self.zones
-        self.effect.build(EffectBuilder(graph, self.effect, zones, alike))
+        self.effect.build(EffectBuilder(graph, self.effect, zones, alike, bool(self.zones)))
 
 
 class EffectBuilder:
@@ -179,10 +178,15 @@ class EffectBuilder:
         Where it may act.
     alike : bool
         Whether zones share what is a zone's otherwise.
+    named : bool
+        Whether somebody named the zones.
     """
 
-    def __init__(self, graph: GraphBuilder, effect: Effect, zones: Sequence[str], alike: bool = False) -> None:
+    def __init__(
+        self, graph: GraphBuilder, effect: Effect, zones: Sequence[str], alike: bool = False, named: bool = False
+    ) -> None:
         self.graph, self.effect, self.anatomy, self._alike = graph, effect, graph.anatomy, alike
+        self.named = named
         self.rooms: tuple[Room, ...] = tuple(graph.anatomy.rooms[z] for z in zones)
         self._count = 0
         self._keys: dict[int, tuple[str, ca.SX]] = {}
@@ -305,29 +309,6 @@ class EffectBuilder:
         return self._keys[number][0]
 
 
-def paired(first: _Part, second: _Part) -> tuple[IntArray, IntArray, FloatArray]:
-    """Faces between two sets of volumes whose flow is that between their means, in as few as can be.
-
-    Every volume takes part by its share on both sides: the north-west corner of a transport problem (Dantzig 1951).
-
-    Parameters
-    ----------
-    first, second : tuple of ndarray
-        Nodes and their shares, which sum to 1 [-].
-
-    Returns
-    -------
-    tuple of ndarray
-        Nodes of the first set, nodes of the second, shares that sum to 1 [-].
-    """
-    ends = [np.cumsum(share) / np.sum(share) for _, share in (first, second)]
-    cuts = np.union1d(*ends)
-    cuts = cuts[np.append(np.diff(cuts) > 1e-12, True)]
-    middle = cuts - np.diff(cuts, prepend=0.0) / 2.0
-    numbers = [np.minimum(np.searchsorted(e, middle), e.size - 1) for e in ends]
-    return first[0][numbers[0]], second[0][numbers[1]], np.diff(cuts, prepend=0.0)
-
-
 def strength(name: str, unit: str, upper: float, source: str, effect: str, lower: float = 0.0) -> Parameter:
     """Parameter of an effect that is absent at 0.
 
@@ -357,29 +338,6 @@ def described(name: str, build: Builder, applies: Callable[[Anatomy], str | None
     )
     rest: Any = {key: tuple(value) if isinstance(value, list) else value for key, value in entry.items()}
     return Effect(**rest | {"id": name, "parameters": parameters, "build": build, "applies": applies})
-
-
-def hat(value: ca.SX, knots: Sequence[float], number: int, signed: bool = False) -> ca.SX:
-    """Weight of one knot in a linear interpolation between knots; flat beyond the ends.
-
-    Parameters
-    ----------
-    value : casadi.SX
-        Where.
-    knots : sequence of float
-        Increasing, in the value's unit [parameter unit].
-    number : int
-        Which of them.
-    signed : bool
-        Whether the line from the first to the second knot goes on below the first: at a strength of zero an
-        interpolation that is flat on one side has half a slope.
-    """
-    last = number + 1 == len(knots)
-    rise = (value - knots[number - 1]) / (knots[number] - knots[number - 1]) if number else ca.SX(1.0)
-    fall = ca.SX(1.0) if last else (knots[number + 1] - value) / (knots[number + 1] - knots[number])
-    if signed and number == 1:
-        return ca.fmin(rise, ca.fmax(0.0, fall))
-    return ca.fmax(0.0, ca.fmin(rise, fall))
 
 
 def lacking(part: str, reason: str) -> Callable[[Anatomy], str | None]:

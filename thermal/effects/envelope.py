@@ -8,7 +8,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from thermal._types import FloatArray
-from thermal.effects.effect import EffectBuilder, described, lacking, paired, without_facades
+from thermal.effects.effect import EffectBuilder, described, lacking, without_facades
+from thermal.effects.weights import paired
 from thermal.inputs.provider import InputProvider
 from thermal.inputs.signals import CONSTANT, STEADY, Signal
 from thermal.network.structure import RATED_OUTSIDE_FILM

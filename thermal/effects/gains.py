@@ -1,15 +1,16 @@
 """Heat of sun and people: sun through glass and on opaque walls, blinds, gains of people, latent load."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from operator import attrgetter
 
 import casadi as ca
 import numpy as np
 
 from thermal._types import FloatArray
-from thermal.effects.effect import EffectBuilder, described, hat, lacking
+from thermal.effects.effect import EffectBuilder, described, lacking
+from thermal.effects.weights import hat
 from thermal.inputs.provider import InputProvider
-from thermal.inputs.signals import CONSTANT, Signal, on_plane
+from thermal.inputs.signals import CONSTANT, DAILY, Signal, daily_waves, on_plane
 from thermal.network.topology import Anatomy
 
 #: Solar transmittance that a window is taken for where another's is known [-]: double glazing (EN 410).
@@ -71,6 +72,9 @@ def _build_opaque(builder: EffectBuilder) -> None:
 
 
 def _build_people(builder: EffectBuilder) -> None:
+    if builder.named:
+        _build_courses(builder)
+        return
     names = ("internal_gain", "internal_gain_delay", "internal_gain_at_home", "base_load")
     peak, shift, home, base = (builder.parameter(n) for n in names)
     arrival = Signal("coming and going", "1/h", attrgetter("occupancy_rate"), ("occupancy_rate",))
@@ -81,6 +85,39 @@ def _build_people(builder: EffectBuilder) -> None:
             own = value if room.name in builder.anatomy.served else value * elsewhere
             builder.heat_air(room, own, signal, 0.5 * room.floor_area)
             builder.heat_surfaces(room, own, signal, 0.5 * room.floor_area)
+
+
+def _build_courses(builder: EffectBuilder) -> None:
+    """Let each room have hours of its own, which are the same every day."""
+    for room in builder.rooms:
+        heat = [(builder.parameter("internal_gain_mean", zone=room.name), CONSTANT)]
+        heat += [(builder.parameter("internal_gain_wave", zone=f"{room.name}, {w.name}"), w) for w in DAILY]
+        for value, signal in heat:
+            builder.heat_air(room, value, signal, 0.5 * room.floor_area)
+            builder.heat_surfaces(room, value, signal, 0.5 * room.floor_area)
+
+
+def daily_course(zone: str, values: Mapping[str, float]) -> FloatArray:
+    """Heat of people of a zone with a course of its own, at each full hour of the clock on the wall, (24,) [W/m2].
+
+    Parameters
+    ----------
+    zone : str
+        Its name.
+    values : mapping of str to float
+        Parameters by name [parameter units]; 0 where there is none.
+
+    Examples
+    --------
+    >>> course = daily_course("A", {"internal_gain_mean@A": 3.0, "internal_gain_wave@A, cos of 24 h": 2.0})
+    >>> round(float(course[0]), 6), round(float(course[12]), 6)
+    (5.0, 1.0)
+    """
+    hours = np.arange(24.0)
+    course = np.full(24, values.get(f"internal_gain_mean@{zone}", 0.0))
+    for wave, of in daily_waves().items():
+        course += values.get(f"internal_gain_wave@{zone}, {wave}", 0.0) * of(hours)
+    return course
 
 
 def _build_latent(builder: EffectBuilder) -> None:

@@ -7,7 +7,8 @@ import casadi as ca
 import numpy as np
 
 from thermal._types import FloatArray
-from thermal.effects.effect import EffectBuilder, described, hat
+from thermal.effects.effect import EffectBuilder, described
+from thermal.effects.weights import hat
 from thermal.inputs.provider import InputProvider
 from thermal.inputs.signals import CONSTANT, Signal, of_zone, zone_signal
 from thermal.network.topology import Emission

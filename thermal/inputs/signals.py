@@ -132,6 +132,10 @@ def on_plane(inputs: InputProvider, azimuth: float, tilt: float) -> FloatArray:
     return np.asarray(sum(inputs.sun.plane(azimuth, tilt)))
 
 
+#: Periods of heat that recurs from day to day [h].
+_PERIODS = (24.0, 12.0, 8.0)
+
+
 def _wave(of: Callable[[FloatArray], FloatArray], period: float, hours: FloatArray) -> FloatArray:
     return of(2.0 * np.pi * hours / period)
 
@@ -140,25 +144,12 @@ def _by_clock(inputs: InputProvider, of: Callable[[FloatArray], FloatArray]) -> 
     return of(inputs.clock)
 
 
-def daily_waves(*periods: float) -> dict[str, Callable[[FloatArray], FloatArray]]:
-    """Sine and cosine of each period by name, as functions of the hour of the day.
-
-    Parameters
-    ----------
-    *periods : float
-        Parts of a day [h].
-    """
+def daily_waves() -> dict[str, Callable[[FloatArray], FloatArray]]:
+    """Sine and cosine of each period by name, as functions of the hour of the day."""
     return {
-        f"{of.__name__} of {period:g} h": partial(_wave, of, period) for period in periods for of in (np.sin, np.cos)
+        f"{of.__name__} of {period:g} h": partial(_wave, of, period) for period in _PERIODS for of in (np.sin, np.cos)
     }
 
 
-def waves_of_day(*periods: float) -> list[Signal]:
-    """Sine and cosine of each period, which repeat from day to day by the clock on the wall.
-
-    Parameters
-    ----------
-    *periods : float
-        Parts of a day [h].
-    """
-    return [Signal.made(name, "1", _by_clock, given={"of": of}) for name, of in daily_waves(*periods).items()]
+#: Sines and cosines of the clock on the wall, of which heat that recurs from day to day is made.
+DAILY = tuple(Signal.made(name, "1", _by_clock, given={"of": of}) for name, of in daily_waves().items())

@@ -17,7 +17,6 @@ from thermal.network.commands import add_commanded
 from thermal.network.emitters import add_emitters
 from thermal.network.films import add_films
 from thermal.network.floor import Floor, Zone
-from thermal.network.gains import add_gains
 from thermal.network.graph import GraphBuilder
 from thermal.network.grid import floor_grid
 from thermal.network.lumped import lump
@@ -162,9 +161,7 @@ def build_network(
 
 def _lumped(building: Building, dx: float | None, structure: Structure) -> Blueprint:
     """Lump a building into two nodes a zone."""
-    drawn = replace(
-        structure, lumped=False, sun=False, steady=False, recurring=False, wind_films=False, natural_films=False
-    )
+    drawn = replace(structure, lumped=False, sun=False, recurring=False, wind_films=False, natural_films=False)
     detailed = build_network(replace(building, commanded=()), dx, structure=drawn)
     graph, air = lump(detailed, building.geometry_quality, structure)
     add_emitters(graph, emitters_of(building, structure.emitter))
@@ -216,8 +213,6 @@ def blueprint(
     baseline = _drawn(building, dx, reach, scopes, diffusers, mean_shuffle, structure)
     if structure.follows_weather:
         add_films(baseline.graph, structure)
-    if structure.steady or structure.recurring:
-        add_gains(baseline.graph, structure)
     add_emitters(baseline.graph, emitters_of(building, structure.emitter))
     add_commanded(baseline.graph, building)
     return baseline

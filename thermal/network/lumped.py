@@ -16,8 +16,7 @@ import scipy.sparse.linalg as sla
 
 from thermal._types import FloatArray, IntArray
 from thermal.case.building import FACADES, GeometryQuality
-from thermal.inputs.signals import Signal, on_plane
-from thermal.network.gains import add_gains
+from thermal.inputs.signals import CONSTANT, DAILY, Signal, on_plane
 from thermal.network.graph import GraphBuilder
 from thermal.network.network import ThermalNetwork
 from thermal.network.structure import Structure
@@ -150,9 +149,7 @@ def lump(network: ThermalNetwork, quality: GeometryQuality, structure: Structure
             zone, i, air[i : i + 1], np.ones(1), int(air[i]), -1, (), (), int(mass[i]), room.floor_area, room.volume
         )
         _add_heated(graph, drawn, i, air, multiplier)
-        if structure.sun:
-            _add_sun(graph, graph.anatomy.rooms[zone], [p for p in old.panes if p.zone == zone], quality)
-    add_gains(graph, structure)
+        _add_gains(graph, graph.anatomy.rooms[zone], [p for p in old.panes if p.zone == zone], quality, structure)
     return graph, air
 
 
@@ -181,9 +178,16 @@ def _add_heated(
                 graph.face(f"screed-{kind} {zone} {side}", scale, node, np.asarray(far)[there], conductance[there])
 
 
-def _add_sun(graph: GraphBuilder, room: Room, panes: list[Pane], quality: GeometryQuality) -> None:
-    """Add the sun from each direction."""
-    for name, (azimuth, tilt) in _PLANES.items():
+def _add_gains(
+    graph: GraphBuilder, room: Room, panes: list[Pane], quality: GeometryQuality, structure: Structure
+) -> None:
+    """Add heat that is always there, that recurs from day to day, and the sun from each direction."""
+    steady = graph.own(PARAMETERS["constant_gain"].of("zone", room.name))
+    graph.source(f"constant gain {room.name}", steady, int(room.air[0]), CONSTANT, room.floor_area)
+    for wave in DAILY if structure.recurring else ():
+        value = graph.own(PARAMETERS["recurring_gain"].of("zone", f"{room.name}, {wave.name}"))
+        graph.source(f"recurring gain {room.name}, {wave.name}", value, int(room.air[0]), wave, room.floor_area)
+    for name, (azimuth, tilt) in _PLANES.items() if structure.sun else ():
         looking = [p for p in panes if (direction_of(p.azimuth) if p.tilt >= 45.0 else "roof") == name]
         glass = sum(p.area * (p.transmittance or _TRANSMITTANCE) for p in looking) / room.floor_area
         own = PARAMETERS["solar_aperture"]
@@ -274,3 +278,4 @@ def _before(network: ThermalNetwork, joined: sp.csr_matrix, pipes: FloatArray) -
             if layer.node.size > 1:
                 before[k] += (layer.area / area) ** 2 * layer.share.prod() / joined[layer.node[0], layer.node[1]]
     return before
+

@@ -100,10 +100,8 @@ class Structure:
         Air and one mass a zone, with a multiplier for every conductance and capacity of the drawing.
     sun : bool
         Of a lumped model: an aperture for the sun a zone and direction.
-    steady : bool
-        A gain a zone that is always there; a lumped model, and one with gains that recur, have it anyway.
     recurring : bool
-        A gain a zone that recurs from day to day, as people and their devices bring it.
+        Of a lumped model: a gain a zone that recurs from day to day, as people and their devices bring it.
     wind_films : bool
         Outside films that follow the wind, of a model that is not lumped.
     natural_films : bool
@@ -131,7 +129,6 @@ class Structure:
     radiant: bool = True
     lumped: bool = False
     sun: bool = False
-    steady: bool = False
     recurring: bool = False
     wind_films: bool = False
     natural_films: bool = False
@@ -143,7 +140,7 @@ class Structure:
         return self.wind_films or self.natural_films
 
     def __post_init__(self) -> None:
-        for name in ("furniture", "radiant", "lumped", "sun", "steady", "recurring", "wind_films", "natural_films"):
+        for name in ("furniture", "radiant", "lumped", "sun", "recurring", "wind_films", "natural_films"):
             if not isinstance(getattr(self, name), bool):
                 raise ModelError(f"structure.{name}: expected true or false, got {getattr(self, name)!r}")
         if self.emitter not in get_args(Unknown):

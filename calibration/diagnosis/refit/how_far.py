@@ -155,23 +155,6 @@ def _on_bound(fit: Fit) -> tuple[str, ...]:
     return tuple(name for (name, effect), c in zip(names, close, strict=True) if c and effect is None)
 
 
-def step_by_structure(effect: str, without: HeldOut, about: Round, floor: HeldOut) -> Step:
-    """Measure what a structure that holds an effect closes of the gap, before anything else is sought about it.
-
-    Parameters
-    ----------
-    effect : str
-        What it holds.
-    without, floor : HeldOut
-        Errors of the model that lacks it, and those that cannot be helped.
-    about : Round
-        The first of the search about the structure.
-    """
-    share, interval = closed(without, about.held_out, floor)
-    ends = without.mae, about.held_out.mae, floor.mae
-    return Step((effect,), *ends, share, interval, None, None, None, _on_bound(about.before))
-
-
 def closed(before: HeldOut, after: HeldOut, floor: HeldOut) -> tuple[float | None, tuple[float, float] | None]:
     """Share of the gap that is closed with its interval; None where the gap is within two standard errors.
 
@@ -207,7 +190,10 @@ def _permutation_test(models: ModelComparison, r: Round, fit: Fit) -> float | No
     varying = [c for c in columns if float(np.ptp(built.inputs.boundary[:, c])) > 0.0]
     if not varying:
         return None
-    permuted = Built(built.network, built.grid, _permuted(built.inputs, varying))
+    others = _permuted(built.inputs, varying)
+    if np.allclose(others.boundary, built.inputs.boundary):  # the same every day
+        return None
+    permuted = Built(built.network, built.grid, others)
     problem = models.problem(permuted, fit.theta)
     model, found = solve(problem, built.grid, fit.theta, _EVALUATIONS, fit.model)
     return held_out(models, replace(fit, built=permuted, problem=problem, model=model, found=found)).mae
