@@ -13,7 +13,7 @@ from calibration.diagnosis.refit.refit import beyond_a_step, held_out
 from calibration.diagnosis.refit.search import Round, search
 from calibration.diagnosis.screen.regular import Regular, regular
 from calibration.fit.fitted_case import FittedCase, fit_case
-from calibration.fit.ladder import ADVANCE, CLOCK, GAINS
+from calibration.fit.ladder import CLOCK, GAINS
 from calibration.fit.left_out import Known, left_out, values_of
 from calibration.fit.result import Rung
 from calibration.progress import Forward, Progress
@@ -52,7 +52,7 @@ class Free:
     left_over : Regular
         What comes back of the errors of its last model.
     kept : FittedCase
-        The structure with the effects that were accepted, unless it predicts clearly better by itself.
+        The structure with the effects that were accepted, unless it predicts better by itself.
     rungs : tuple of Rung
         Structures by their errors, and this one with the effects.
     """
@@ -168,8 +168,7 @@ def search_free(
     people live in are larger than those of an office whose heat is all metered, so that only what comes back counts as
     left over. What the structure itself has found and the catalogue has a name for is sought by its name: the sun, a
     gain that recurs from day to day, and weather that is moved by more than a step of the telemetry, until one is
-    found. What is named is handed on unless the structure alone predicts left-out days better by a tenth: its sun has
-    apertures.
+    found. What is named is handed on unless the structure alone predicts left-out days better: its sun has apertures.
 
     Parameters
     ----------
@@ -216,7 +215,7 @@ def search_free(
         named = fit_case(models.case, models.tuned, models.judged, further, ahead.part(1.0), known_fit)
         left = left_out(named.best, models.tuned, further.spin_up_seconds)
         named, alone = replace(named, left=left), kept.left
-        better = alone is not None and alone.mae < (1.0 - ADVANCE) * left.mae
+        better = alone is not None and alone.mae < left.mae
         rungs = tuple(replace(r, chosen=r.chosen and better) for r in rungs)
         rungs += (Rung(FOUND, left.mae, len(named.best.problem.free), not better),)
         kept = kept if better else named

@@ -221,8 +221,8 @@ def _courses(by_zone: Mapping[str, FloatArray]) -> list[str]:
     """Spell the heat of people with hours of their own, the zones in which it swings most first."""
     most = sorted(by_zone, key=lambda zone: -float(np.ptp(by_zone[zone])))
     told = [
-        f"{zone}: {significant(by_zone[zone].mean(), 2)} W/m² in the mean, most at {int(np.argmax(by_zone[zone]))}:00 "
-        f"({significant(by_zone[zone].max(), 2)})"
+        f"{zone}: {by_zone[zone].mean():.1f} W/m² in the mean, most at {int(np.argmax(by_zone[zone]))}:00 "
+        f"({by_zone[zone].max():.1f})"
         for zone in most[:_MOST_VALUES]
     ]
     more = len(most) - _MOST_VALUES

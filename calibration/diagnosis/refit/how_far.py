@@ -36,7 +36,7 @@ class Step:
     Parameters
     ----------
     effects : tuple of str
-        Those in the model.
+        Those accepted so far; what the baseline has already is none of them.
     before, after, floor : float
         Held-out mean absolute error of the calibrated baseline, with the effects, and that which nothing that is
         smooth in time of day and outdoor temperature would lower [K].
@@ -112,9 +112,10 @@ def how_far(models: ModelComparison, rounds: Sequence[Round]) -> tuple[tuple[Ste
         after, fit = r.accepted.held_out, r.accepted.fit
         runner_up = next((x.held_out.mae for x in r.refits if x is not r.accepted), None)
         share, interval = closed(before, after, floor)
+        found = tuple(e for e in fit.effects if e not in rounds[0].before.effects)
         steps.append(Step(
-            tuple(fit.effects), before.mae, after.mae, floor.mae, share, interval, _permutation_test(models, r, fit),
-            runner_up, agree.get(r.accepted.screened.effect), _on_bound(fit),
+            found, before.mae, after.mae, floor.mae, share, interval, _permutation_test(models, r, fit), runner_up,
+            agree.get(r.accepted.screened.effect), _on_bound(fit),
         ))  # fmt: skip
     return tuple(steps), floor
 
