@@ -41,7 +41,7 @@ def with_people(models: ModelComparison, rounds: Sequence[Round], kept: FittedCa
     models : ModelComparison
         The case as drawn.
     rounds : sequence of Round
-        Of the search about the drawing.
+        Of the search about the drawing; the last found nothing.
     kept : FittedCase
         The drawing with that heat, and with what was found before or without it.
 
@@ -51,7 +51,7 @@ def with_people(models: ModelComparison, rounds: Sequence[Round], kept: FittedCa
         Rounds before and that one with the heat accepted; and the heat, fitted, which the search goes on with.
     """
     effects = kept.settings.effects
-    number = next(k for k, r in enumerate(rounds) if r.before.effects.keys() == effects.keys() - {GAINS})
+    number = 0 if rounds[0].before.effects.keys() == effects.keys() - {GAINS} else len(rounds) - 1
     begun = rounds[number]
     level = accepted_from(begun.own)
     # what tangents say of it by a schedule tells where it looks like others

@@ -256,8 +256,9 @@ def _other_structures(about: _About, known: Sequence[str], ruled_out: Sequence[s
     # a drawing that is known to lack what nothing explains has no advance
     advance = 0.0 if unexplained else ADVANCE
     for fit in held_against(rounds, case.building.geometry_quality):
-        given, all_found = rounds[0].before.effects, fit.effects
-        beside = () if GAINS in ruled_out else (given,) if all_found.keys() == given.keys() else (given, all_found)
+        beside = [] if GAINS in ruled_out else [rounds[0].before.effects]
+        if beside and fit is rounds[-1].before and fit is not rounds[0].before:
+            beside.append(fit.effects)
         structures = Structures(*other_structures(models, fit, whole.part(0.5), advance, beside))
         about = about._replace(structures=structures)
         if structures.kept is not None and finds_people(structures.kept):

@@ -261,8 +261,9 @@ def _measure_next(result: Diagnosis) -> list[tuple[str, str]]:
     names = [r.screened.effect for r in accepted(result)]
     faults = [(called(f.effect, f.zones).capitalize(), f.seen.advice) for f in result.faults]
     for name in list(names) or ([] if faults else [result.verdict.candidates[0].effect]):
-        names += [e for e in (name, *rivals(result, name)[:LARGEST_GROUP]) if e not in names]
-    told = [(called(e).capitalize(), CATALOGUE[e].separated_by) for e in names if CATALOGUE[e].separated_by]
+        names += [name, *rivals(result, name)[:LARGEST_GROUP]]
+    once = [e for e in dict.fromkeys(names) if CATALOGUE[e].separated_by]
+    told = [(called(e).capitalize(), CATALOGUE[e].separated_by) for e in once]
     return [*faults, *told]
 
 

@@ -65,3 +65,15 @@ def test_sun_that_nobody_measures_is_named_where_the_drawing_does_not_hold() -> 
     found = seek(without_irradiance(shared("measured_quebec9zone")))
     assert found.free is not None
     assert found.verdict.name in ("named", "group") and found.verdict.candidates[0].effect == "solar_gain"
+
+
+@pytest.mark.long
+def test_the_sun_of_a_free_structure_is_named_and_what_predicts_better_is_handed_on() -> None:
+    found = seek(shared("measured_quebec9zone"))
+    assert (found.verdict.name, found.verdict.candidates[0].effect) == ("named", "solar_gain")
+    assert [step["effects"] for step in found.to_dict()["how_far"]] == [("solar_gain",)]
+    assert found.structures is not None and found.structures.kept is not None
+    *others, named = found.structures.rungs
+    (chosen,) = (rung for rung in (*others, named) if rung.chosen)
+    assert named.name == "found" and chosen.left_out_mae <= named.left_out_mae
+    assert ("solar_gain" in found.structures.kept.settings.effects) == named.chosen
