@@ -12,8 +12,9 @@ from calibration.diagnosis.refit.comparison import Effects, Fit, ModelComparison
 from calibration.diagnosis.refit.refit import beyond_a_step, held_out
 from calibration.diagnosis.refit.search import Round, search
 from calibration.diagnosis.screen.regular import Regular, regular
+from calibration.evaluation.settings import CalibrationSettings
 from calibration.fit.fitted_case import FittedCase, fit_case
-from calibration.fit.ladder import CLOCK, GAINS
+from calibration.fit.ladder import ADVANCE, CLOCK, GAINS
 from calibration.fit.left_out import Known, left_out, values_of
 from calibration.fit.result import Rung
 from calibration.progress import Forward, Progress
@@ -168,7 +169,8 @@ def search_free(
     people live in are larger than those of an office whose heat is all metered, so that only what comes back counts as
     left over. What the structure itself has found and the catalogue has a name for is sought by its name: the sun, a
     gain that recurs from day to day, and weather that is moved by more than a step of the telemetry, until one is
-    found. What is named is handed on unless the structure alone predicts left-out days better: its sun has apertures.
+    found that predicts left-out days about as well. What is named is handed on unless the structure alone predicts
+    them better: its sun has apertures.
 
     Parameters
     ----------
@@ -207,16 +209,35 @@ def search_free(
         baseline = free.fit({**own, **{e: () for e in known}}, [values_of(found)])
         rounds = search(free, baseline, held_out(free, baseline), testable, ahead.part(0.5))
         final = rounds[-1].after
-        if sought is None or sought in final.effects:
+        named = None
+        if final.effects.keys() != baseline.effects.keys():
+            named = _fit_named(models, replace(chosen, structure=structure), final, ahead.part(0.5))
+        if sought is None or (named is not None and sought in final.effects and _as_good(named, kept)):
             break
-    if final.effects.keys() != baseline.effects.keys():
-        known_fit = Known(final.problem, final.model, final.point)
-        further = replace(chosen, structure=structure, effects=dict(final.effects))
-        named = fit_case(models.case, models.tuned, models.judged, further, ahead.part(1.0), known_fit)
-        left = left_out(named.best, models.tuned, further.spin_up_seconds)
-        named, alone = replace(named, left=left), kept.left
-        better = alone is not None and alone.mae < left.mae
+    if named is not None:
+        better = _error(kept) < _error(named)
         rungs = tuple(replace(r, chosen=r.chosen and better) for r in rungs)
-        rungs += (Rung(FOUND, left.mae, len(named.best.problem.free), not better),)
+        rungs += (Rung(FOUND, _error(named), len(named.best.problem.free), not better),)
         kept = kept if better else named
     return Free(free, rounds, untestable, regular(free, final), kept, rungs)
+
+
+def _fit_named(
+    models: ModelComparison, settings: CalibrationSettings, final: Fit, progress: Progress | None
+) -> FittedCase:
+    """Fit a structure with what was found about it, and leave days out."""
+    known = Known(final.problem, final.model, final.point)
+    named = fit_case(
+        models.case, models.tuned, models.judged, replace(settings, effects=dict(final.effects)), progress, known
+    )
+    return replace(named, left=left_out(named.best, models.tuned, settings.spin_up_seconds))
+
+
+def _error(fitted: FittedCase) -> float:
+    """Error on left-out days [K]; without any as large as can be."""
+    return np.inf if fitted.left is None else fitted.left.mae
+
+
+def _as_good(named: FittedCase, kept: FittedCase) -> bool:
+    """Whether a name does what the structure does by itself."""
+    return _error(named) < (1.0 + ADVANCE) * _error(kept)
