@@ -7,12 +7,12 @@ import pytest
 
 from thermal.data import load_bundled_case
 from thermal.inputs.provider import telemetry_inputs
-from thermal.inputs.signals import signal_values, waves_of_day
+from thermal.inputs.signals import DAILY, daily_waves, signal_values
 
 
 def test_waves_repeat_from_day_to_day_and_are_independent() -> None:
     inputs = telemetry_inputs(load_bundled_case())
-    waves = waves_of_day(24.0, 12.0, 8.0)
+    waves = DAILY
     assert len({wave.name for wave in waves}) == 6
     values = signal_values(waves, inputs)
     a_day = int(86400.0 / inputs.step)
@@ -22,3 +22,6 @@ def test_waves_repeat_from_day_to_day_and_are_independent() -> None:
     # the sine of a day is at its top at six in the morning by the building's clock
     top = inputs.stamps[int(np.argmax(values[:a_day, 0]))] - timedelta(seconds=inputs.step / 2.0)
     assert abs(top.hour + top.minute / 60.0 - 6.0) <= inputs.step / 3600.0
+    # by name, they are functions of the hour
+    for wave, column in zip(DAILY, values.T, strict=True):
+        assert column == pytest.approx(daily_waves()[wave.name](inputs.clock), abs=1e-12)
