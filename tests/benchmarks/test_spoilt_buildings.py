@@ -128,11 +128,15 @@ def test_what_the_building_has_itself_is_no_answer(spoilt: ModuleType, house: Ca
         which = [{**entry, "effect": e, "group": [e]} for e in order]
         content = {
             "verdict": "named", "gap": {"mae": 0.3 if null else 0.5}, "which": which, "set90": order[:2],
-            "how_far": [{"effects": order[:1], "share_closed": 0.5}], "seconds": 1.0,
+            "how_far": [{"effects": order[:1], "share_closed": 0.5, "held_out_mae_after": 0.1 if null else 0.2}],
+            "seconds": 1.0,
         }  # fmt: skip
         (answers / f"{name}.json").write_text(json.dumps(content))
     found = {label["kind"]: trial for label, trial in spoilt.read(tmp_path / "out").values()}
-    assert found["null"].ranked(1) == ["solar_gain"]
+    # the sun is every building's own, with its windows
+    assert found["null"].ranked(1) == ["sensor_bias"] and found["null"].answer["verdict"] == "no_gap"
+    assert found["sensor_bias"].twins == (0.1,) and found["sensor_bias"].answer["gap"]["mae"] == 0.2
+    assert found["no_irradiance"].ranked(1) == ["solar_gain"]  # where it is what was taken away it is the answer
     assert found["sensor_bias"].right_first and found["sensor_bias"].counted
     assert not found["sensor_lag"].right_first
     assert "| case | sensor_bias |" in spoilt.report(tmp_path / "out")
