@@ -215,7 +215,7 @@ def read(out: Path) -> dict[str, tuple[dict[str, Any], Trial]]:
         twin = float("nan") if as_is is None else _error_with(as_is, own)
         answer = {**answer, "which": [c for c in answer["which"] if c["effect"] not in own]}
         answer["gap"] = {**answer["gap"], "mae": _error_with(answer, own)}
-        if own and _effects_of(answer) <= own and answer["verdict"] != "unexplained":
+        if set() < _effects_of(answer) <= own and answer["verdict"] != "unexplained":
             answer["verdict"] = "no_gap"  # nothing but what the building is known to have
         found[name] = label, Trial(
             name, "null" if null else "single", () if null else (frozenset(right),), () if null else (label["kind"],),

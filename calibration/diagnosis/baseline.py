@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.fit.ladder import fit_emitter
-from calibration.fit.left_out import Known, values_of
+from calibration.fit.left_out import values_of
 from calibration.progress import Progress
 
 
@@ -30,7 +30,7 @@ def fit_baseline(
     """
     known = {name: tuple(zones) for name, zones in effects.items()}
     found = models.fit(known, [{}])
-    heated = fit_emitter(Known(found.weighed, found.model, found.point), models, known, progress)
+    heated = fit_emitter(found.known, models, known, progress)
     if heated is None:
         return models, found
     settings = replace(models.settings, structure=heated.settings.structure)

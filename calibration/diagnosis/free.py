@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calibration.diagnosis.decide.levels import RECURRING
 from calibration.diagnosis.decide.name import VerdictName
 from calibration.diagnosis.decide.verdict import Verdict
 from calibration.diagnosis.known import reasons_of
@@ -15,7 +16,7 @@ from calibration.diagnosis.screen.regular import Regular, regular
 from calibration.evaluation.settings import CalibrationSettings
 from calibration.fit.fitted_case import FittedCase, fit_case
 from calibration.fit.ladder import ADVANCE, CLOCK, GAINS
-from calibration.fit.left_out import Known, left_out, values_of
+from calibration.fit.left_out import left_out, values_of
 from calibration.fit.result import Rung
 from calibration.progress import Forward, Progress
 from thermal.case.building import GeometryQuality
@@ -34,8 +35,8 @@ SUN, FOUND = "solar_gain", "found"
 #: Share of the lumped structure's error on left-out days below which a gain that recurs in each zone has a name [-]: on
 #: development seeds of houses and EnergyPlus' reference buildings 0.44, 0.54 and 0.84 where people's heat is missing,
 #: 0.74 and more in 31 nulls but one that the drawing fits (what cycles, and heated floors, recur a little); 0.71 in a
-#: measured house. And how sure it then is.
-_RECURS, _SURE = 0.6, 0.9
+#: measured house.
+_RECURS = 0.6
 
 
 @dataclass(frozen=True)
@@ -133,11 +134,11 @@ def with_recurring(verdict: Verdict, free: Free, rungs: Sequence[Rung]) -> Verdi
     plain = not structure.recurring or recurs(rungs) is None or GAINS in free.rounds[-1].after.effects
     if plain or not own.testable or verdict.name == "unexplained":
         return verdict
-    told = replace(own, probability=_SURE, group=(GAINS,), zones=(), parameters={})
+    told = replace(own, probability=RECURRING, group=(GAINS,), zones=(), parameters={})
     ahead = [c for c in verdict.candidates if c.effect in there and verdict.name in ("named", "group")]
     rest = [c for c in verdict.candidates if c is not own and c not in ahead]
-    chain = {e: (1.0 - _SURE) * p for e, p in verdict.combinations.items()}
-    chain |= {(*e, GAINS): _SURE * p for e, p in verdict.combinations.items()}
+    chain = {e: (1.0 - RECURRING) * p for e, p in verdict.combinations.items()}
+    chain |= {(*e, GAINS): RECURRING * p for e, p in verdict.combinations.items()}
     name: VerdictName = "named" if verdict.name == "no_gap" else verdict.name
     set90 = tuple(dict.fromkeys((*verdict.set90, GAINS)))
     return replace(verdict, name=name, candidates=(*ahead, told, *rest), set90=set90, combinations=chain)
@@ -152,7 +153,7 @@ def is_recurring(verdict: Verdict) -> bool:
         Of a diagnosis.
     """
     own = next(c for c in verdict.candidates if c.effect == GAINS)
-    return verdict.name in ("named", "group") and own.probability == _SURE and not own.parameters
+    return verdict.name in ("named", "group") and own.probability == RECURRING and not own.parameters
 
 
 def search_free(
@@ -209,10 +210,12 @@ def search_free(
         baseline = free.fit({**own, **{e: () for e in known}}, [values_of(found)])
         rounds = search(free, baseline, held_out(free, baseline), testable, ahead.part(0.5))
         final = rounds[-1].after
+        if sought is not None and sought not in final.effects:
+            continue
         named = None
         if final.effects.keys() != baseline.effects.keys():
             named = _fit_named(models, replace(chosen, structure=structure), final, ahead.part(0.5))
-        if sought is None or (named is not None and sought in final.effects and _as_good(named, kept)):
+        if sought is None or (named is not None and _error(named) < (1.0 + ADVANCE) * _error(kept)):
             break
     if named is not None:
         better = _error(kept) < _error(named)
@@ -226,18 +229,11 @@ def _fit_named(
     models: ModelComparison, settings: CalibrationSettings, final: Fit, progress: Progress | None
 ) -> FittedCase:
     """Fit a structure with what was found about it, and leave days out."""
-    known = Known(final.problem, final.model, final.point)
-    named = fit_case(
-        models.case, models.tuned, models.judged, replace(settings, effects=dict(final.effects)), progress, known
-    )
+    further = replace(settings, effects=dict(final.effects))
+    named = fit_case(models.case, models.tuned, models.judged, further, progress, final)
     return replace(named, left=left_out(named.best, models.tuned, settings.spin_up_seconds))
 
 
 def _error(fitted: FittedCase) -> float:
     """Error on left-out days [K]; without any as large as can be."""
     return np.inf if fitted.left is None else fitted.left.mae
-
-
-def _as_good(named: FittedCase, kept: FittedCase) -> bool:
-    """Whether a name does what the structure does by itself."""
-    return _error(named) < (1.0 + ADVANCE) * _error(kept)

@@ -16,7 +16,7 @@ from calibration.evaluation.simple_models import with_yardsticks
 from calibration.fit.estimate import tune
 from calibration.fit.fitted_case import FittedCase, is_large
 from calibration.fit.ladder import climb_from
-from calibration.fit.left_out import Known, LeftOut, left_out
+from calibration.fit.left_out import LeftOut, left_out
 from calibration.fit.result import CalibrationResult, Rung, effect_entries
 from calibration.progress import Progress
 
@@ -51,7 +51,7 @@ def other_structures(
     if is_large(final.built.network.zones):
         return (), None, None
     name = "named" if final.effects else "drawn"
-    return climb_from(name, Known(final.weighed, final.model, final.point), models, progress, advance, beside)
+    return climb_from(name, final.known, models, progress, advance, beside)
 
 
 def with_correction(
@@ -78,7 +78,7 @@ def with_correction(
     if correction is None:
         return rungs, left
     made = correction.fit
-    found = left_out(Known(made.weighed, made.model, made.point), models.tuned, models.settings.spin_up_seconds)
+    found = left_out(made.known, models.tuned, models.settings.spin_up_seconds)
     kept = found.mae < min((r.left_out_mae for r in rungs if r.chosen), default=np.inf)
     others = tuple(replace(r, chosen=r.chosen and not kept) for r in rungs)
     return (*others, Rung(CORRECTED, found.mae, len(made.problem.free), kept)), found if kept else left

@@ -9,28 +9,24 @@ from dataclasses import replace
 
 import numpy as np
 
-from calibration.diagnosis.decide.levels import TEMPERATURE
+from calibration.diagnosis.decide.levels import RECURRING, TEMPERATURE
 from calibration.diagnosis.refit.comparison import ModelComparison
 from calibration.diagnosis.refit.refit import Refit, Work
 from calibration.diagnosis.refit.search import Round, accepted_from
-from calibration.diagnosis.screen.gains import Gain
 from calibration.fit.fitted_case import FittedCase
 from calibration.fit.ladder import GAINS
 from calibration.fit.left_out import values_of
 
-#: Probability of people's heat that left-out days show [-], as of a gain that recurs about a lumped structure.
-SURE = 0.9
 
-
-def finds_people(kept: FittedCase | None) -> bool:
+def finds_people(kept: FittedCase) -> bool:
     """Whether the drawing predicts left-out days best with people who have hours of their own in each zone.
 
     Parameters
     ----------
-    kept : FittedCase or None
-        The structure that predicts best, where that is not the drawing.
+    kept : FittedCase
+        The structure that predicts best.
     """
-    return kept is not None and bool(kept.settings.effects.get(GAINS))
+    return bool(kept.settings.effects.get(GAINS))
 
 
 def with_people(models: ModelComparison, rounds: Sequence[Round], kept: FittedCase) -> tuple[tuple[Round, ...], Refit]:
@@ -54,14 +50,13 @@ def with_people(models: ModelComparison, rounds: Sequence[Round], kept: FittedCa
     number = 0 if rounds[0].before.effects.keys() == effects.keys() - {GAINS} else len(rounds) - 1
     begun = rounds[number]
     level = accepted_from(begun.own)
-    # what tangents say of it by a schedule tells where it looks like others
-    scheduled = next((g for g in begun.gains if g.effect == GAINS), None)
-    nothing = np.zeros(0)
-    gain = scheduled or Gain(GAINS, (), 0.0, 0.0, {}, {}, 1.0, nothing, nothing.astype(np.int64))
+    # what tangents say of it by a schedule, which every case can tell, is what it looks like
+    scheduled = next(g for g in begun.gains if g.effect == GAINS)
     work = Work(models, begun.before, begun.held_out, begun.screening, level)
     fitted = models.fit(effects, [values_of(kept.best)])
-    found = work.weighed([replace(gain, zones=tuple(effects[GAINS]))], fitted)
-    found = replace(found, gain=max(found.gain, level + TEMPERATURE * float(np.log(SURE / (1.0 - SURE)))), counts=True)
+    found = work.weighed([replace(scheduled, zones=tuple(effects[GAINS]))], fitted)
+    told = level + TEMPERATURE * float(np.log(RECURRING / (1.0 - RECURRING)))
+    found = replace(found, gain=max(found.gain, told), counts=True)
     others = (r for r in begun.refits if r.screened.effect != GAINS)
     refits = sorted((found, *others), key=lambda r: -r.gain)
     return (*rounds[:number], replace(begun, refits=tuple(refits), accepted=found, pair=None)), found

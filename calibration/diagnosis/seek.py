@@ -25,7 +25,7 @@ from calibration.evaluation.intervals import Interval
 from calibration.evaluation.settings import ModelSettings
 from calibration.fit.fitted_case import FittedCase, is_large
 from calibration.fit.ladder import ADVANCE, GAINS
-from calibration.fit.left_out import Known, LeftOut, left_out
+from calibration.fit.left_out import LeftOut, left_out
 from calibration.fit.result import Rung
 from calibration.progress import Forward, Progress
 from calibration.results import plain
@@ -261,12 +261,13 @@ def _other_structures(about: _About, known: Sequence[str], ruled_out: Sequence[s
             beside.append(fit.effects)
         structures = Structures(*other_structures(models, fit, whole.part(0.5), advance, beside))
         about = about._replace(structures=structures)
-        if structures.kept is not None and finds_people(structures.kept):
-            return _beside_people(about, structures, structures.kept, whole)
-        if structures.kept is not None and drawing_fails(structures.rungs, structures.kept):  # names make up for it
+        kept = structures.kept
+        if kept is not None and finds_people(kept):
+            return _beside_people(about, structures, kept, whole)
+        if kept is not None and drawing_fails(structures.rungs, kept):  # names make up for it
             part = whole.part(0.6, "free structure")
-            free = search_free(models, structures.rungs, structures.kept, known, ruled_out, part)
-            structures = Structures(free.rungs, free.kept, free.kept.left or structures.left)
+            free = search_free(models, structures.rungs, kept, known, ruled_out, part)
+            structures = Structures(free.rungs, free.kept, free.kept.left)
             return _About(free.models, free.rounds, free.untestable, structures, free, free.left_over)
     if unexplained and (rounds[0].accepted or alone) and not is_large(case.building.zone_names):
         left_over = regular(models, rounds[-1].after)
@@ -282,7 +283,7 @@ def _beside_people(about: _About, structures: Structures, kept: FittedCase, whol
     testable = [e for e in CATALOGUE if e not in about.untestable]
     rounds += search(models, found.fit, found.held_out, testable, whole.part(0.6, "beside people's heat"))
     final = rounds[-1].after
-    left = left_out(Known(final.weighed, final.model, final.point), models.tuned, models.settings.spin_up_seconds)
+    left = left_out(final.known, models.tuned, models.settings.spin_up_seconds)
     unexplained = judge(rounds, about.untestable).name == "unexplained"
     left_over = regular(models, final) if unexplained else None
     return about._replace(rounds=rounds, structures=structures._replace(kept=None, left=left), left_over=left_over)

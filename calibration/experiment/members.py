@@ -265,7 +265,7 @@ def _inside(effect: str, zones: tuple[str, ...], case: Case, where: str) -> tupl
     there = case.building.zone_names
     for zone in zones:
         CalibrationError.unless_known(zone, there, f"{where}: zones of {effect}", "zones of the case")
-    return tuple(z for z in there if z in zones) if CATALOGUE[effect].zonal or CATALOGUE[effect].courses else ()
+    return tuple(z for z in there if z in zones) if CATALOGUE[effect].takes_zones else ()
 
 
 def comparison(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 from typing import Protocol
 
 from calibration.evaluation.intervals import Interval, days_of
@@ -88,7 +87,7 @@ def climb(drawn: FittedCase, began: float, progress: Progress | None = None) -> 
         return drawn.result(began, progress)
     try:
         drawn.raise_if_interrupted()
-        rungs, kept, left = climb_from("drawn", drawn.best, drawn, whole.part(0.6))
+        rungs, kept, left = climb_from("drawn", drawn.best, drawn, whole.part(0.6), beside=[{}])
     except KeyboardInterrupt:  # what is finished is the drawing's
         stopped = replace(drawn.best.solve, success=False, status=INTERRUPTED, interrupted=True)
         return replace(drawn, best=replace(drawn.best, solve=stopped)).result(began, whole.part(1.0))
@@ -154,7 +153,7 @@ def climb_from(
     given: Tuned,
     progress: Progress | None = None,
     advance: float = ADVANCE,
-    beside: Sequence[Mapping[str, Sequence[str]]] = (MappingProxyType({}),),
+    beside: Sequence[Mapping[str, Sequence[str]]] = (),
 ) -> tuple[tuple[Rung, ...], FittedCase | None, LeftOut]:
     """Fit further structures beside a fitted model; the simplest is kept that predicts left-out days about best.
 
@@ -180,7 +179,7 @@ def climb_from(
         Share by which another's error must be less than the fitted model's [-].
     beside : sequence of mapping of str to sequence of str
         Effects beside which the heat of people is tried, with their zones: those that are known, and all that the
-        fitted model has where it has others.
+        fitted model has where it has others; it is not tried by default.
 
     Returns
     -------

@@ -225,8 +225,13 @@ def _courses(by_zone: Mapping[str, FloatArray]) -> list[str]:
         f"({by_zone[zone].max():.1f})"
         for zone in most[:_MOST_VALUES]
     ]
-    more = len(most) - _MOST_VALUES
-    return [*told, f"and {more} more"] if more > 0 else told
+    return _with_more(told, len(most))
+
+
+def _with_more(spelled: list[str], count: int) -> list[str]:
+    """Say how many are not spelled."""
+    more = count - len(spelled)
+    return [*spelled, f"and {more} more"] if more > 0 else spelled
 
 
 def _values(result: Diagnosis, effect: str) -> list[str]:
@@ -250,8 +255,7 @@ def _values(result: Diagnosis, effect: str) -> list[str]:
         if p.at_bound and p.value != 0.0:
             told += ", at the end of its range"
         spelled.append(f"{base.replace('_', ' ').replace('u value', 'U-value')}{place}: {told}")
-    more = len(found) - _MOST_VALUES
-    return [*spelled, f"and {more} more"] if more > 0 else spelled
+    return _with_more(spelled, len(found))
 
 
 def _measure_next(result: Diagnosis) -> list[tuple[str, str]]:

@@ -35,14 +35,14 @@ def diagnosis_means(result: Diagnosis) -> Means:
         first = result.faults[0].seen
         answer = f"The measurements themselves are wrong: {first.what}."
         return Means(answer, "All that follows is about the data with that put right.", f"{_sentence(first.advice)}")
-    if name == "named" and not found:  # a structure holds it
+    if not found and name in ("named", "group"):  # a structure holds it
         best = result.verdict.candidates[0]
         answer = f"The plain model lacks {called(best.effect)}, at hours of its own in each zone."
         trust = f"It is {sure(best.probability)} sure. With it the model misses by {kelvin(result.gap)} degrees C "
         trust += f"{ahead(result)}, on days that it had not seen."
         use = "Use calibration.json, which has it, to predict and to control (buildingmpc compare)."
         return Means(answer, trust, use)
-    if name == "no_gap" or (not found and name != "unexplained"):
+    if name == "no_gap":
         answer = "Nothing: the model explains this building as well as these data can show."
         trust = f"It misses by {kelvin(result.gap)} degrees C {ahead(result)}, on days that it had not seen. Small "
         trust += "effects may hide below what could be noticed (see the statistics)."

@@ -96,6 +96,11 @@ class Effect:
     roughly: bool = False
     keywords: tuple[str, ...] = ()
 
+    @property
+    def takes_zones(self) -> bool:
+        """Whether zones may be named for it."""
+        return self.zonal or self.courses
+
     def is_meant_by(self, words: Sequence[str], begun: bool = False) -> bool:
         """Tell whether words may mean this effect: any of them is one of its own.
 
@@ -158,7 +163,7 @@ class Chosen:
         if unknown:
             known = nearest(unknown[0], graph.zones)
             raise EffectError(f"effect {self.effect.id}: zones {unknown} are not of this building; {known}")
-        if self.zones and not (self.effect.zonal or self.effect.courses):
+        if self.zones and not self.effect.takes_zones:
             found = f"zones {list(self.zones)}; leave them out"
             raise EffectError(f"effect {self.effect.id}: acts on the whole building, got {found}")
         zones = graph.zones if alike or not self.zones else self.zones

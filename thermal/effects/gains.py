@@ -11,7 +11,7 @@ from thermal.effects.effect import EffectBuilder, described, lacking
 from thermal.effects.weights import hat
 from thermal.inputs.provider import InputProvider
 from thermal.inputs.signals import CONSTANT, DAILY, Signal, daily_waves, on_plane
-from thermal.network.topology import Anatomy
+from thermal.network.topology import Anatomy, Room
 
 #: Solar transmittance that a window is taken for where another's is known [-]: double glazing (EN 410).
 _USUAL_TRANSMITTANCE = 0.6
@@ -71,6 +71,11 @@ def _build_opaque(builder: EffectBuilder) -> None:
         builder.graph.source(builder.key(), absorptance * faces.value / look.film, faces.node, signal, faces.area)
 
 
+def _give_half_to_air(builder: EffectBuilder, room: Room, value: ca.SX, signal: Signal) -> None:
+    builder.heat_air(room, value, signal, 0.5 * room.floor_area)
+    builder.heat_surfaces(room, value, signal, 0.5 * room.floor_area)
+
+
 def _build_people(builder: EffectBuilder) -> None:
     if builder.named:
         _build_courses(builder)
@@ -83,8 +88,7 @@ def _build_people(builder: EffectBuilder) -> None:
     for value, signal in ((peak, PRESENCE), (-peak * shift, arrival), (home, AT_HOME), (base, CONSTANT)):
         for room in builder.rooms:
             own = value if room.name in builder.anatomy.served else value * elsewhere
-            builder.heat_air(room, own, signal, 0.5 * room.floor_area)
-            builder.heat_surfaces(room, own, signal, 0.5 * room.floor_area)
+            _give_half_to_air(builder, room, own, signal)
 
 
 def _build_courses(builder: EffectBuilder) -> None:
@@ -93,8 +97,7 @@ def _build_courses(builder: EffectBuilder) -> None:
         heat = [(builder.parameter("internal_gain_mean", zone=room.name), CONSTANT)]
         heat += [(builder.parameter("internal_gain_wave", zone=f"{room.name}, {w.name}"), w) for w in DAILY]
         for value, signal in heat:
-            builder.heat_air(room, value, signal, 0.5 * room.floor_area)
-            builder.heat_surfaces(room, value, signal, 0.5 * room.floor_area)
+            _give_half_to_air(builder, room, value, signal)
 
 
 def daily_course(zone: str, values: Mapping[str, float]) -> FloatArray:

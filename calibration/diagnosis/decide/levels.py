@@ -60,5 +60,8 @@ SMALL, DOUBTFUL = 4.0, 1.0
 #: Most probability of an effect whose signals explain as much on other days, or that does not repeat [-].
 VOID = 0.5
 
+#: Probability of people's heat that days which were left out show, as it recurs in each zone [-].
+RECURRING = 0.9
+
 #: Probability from which an effect belongs to the 90 % set [-].
 IN_SET = 0.1

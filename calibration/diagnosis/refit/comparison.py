@@ -13,6 +13,7 @@ from calibration.evaluation import intervals
 from calibration.evaluation.intervals import Interval, horizon_steps
 from calibration.evaluation.n_step import Evaluation, EvaluationSettings, evaluate_model
 from calibration.evaluation.settings import CalibrationSettings, ModelSettings, calibration_settings
+from calibration.fit.left_out import Known
 from calibration.fit.problem import Problem
 from calibration.fit.result import ParameterEstimate, describe_parameters
 from calibration.fit.tuning_runs import tuning_runs
@@ -134,6 +135,11 @@ class Fit:
     def weighed(self) -> Problem:
         """The problem with the deviation of its errors, which the fit has found beside its parameters."""
         return replace(self.problem, deviation=float(np.sqrt(self.found.mean_square)))
+
+    @property
+    def known(self) -> Known:
+        """What other fits begin from, and what days are left out of."""
+        return Known(self.weighed, self.model, self.point)
 
     @property
     def point(self) -> FloatArray:
