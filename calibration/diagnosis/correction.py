@@ -160,7 +160,15 @@ class _Work:
 
     def strengths(self, kind: Kind) -> FloatArray:
         """Strengths of one of its kinds, one a signal [parameter units]."""
-        own = [self.values[p.name] for p in kind.chosen.effect.parameters]
+        return np.append([self.values[name] for name in self.names], 0.0)[self.columns(kind)]
+
+    @property
+    def names(self) -> list[str]:
+        return [p.name for p in self.built.network.parameters]
+
+    def columns(self, kind: Kind) -> IntArray:
+        """Place of each signal's strength among its parameters; -1 where no zone gets it, as where none has a roof."""
+        own = [self.names.index(p.name) if p.name in self.names else -1 for p in kind.chosen.effect.parameters]
         return np.array(own * (len(UNKNOWN[kind.effect].parameters) if kind.joined else 1))
 
 
@@ -312,9 +320,9 @@ def _zones(kinds: Sequence[Kind]) -> dict[str, tuple[str, ...]]:
 def _drivers(models: ModelComparison, fit: Fit, work: _Work, p_values: Mapping[str, float]) -> tuple[Driver, ...]:
     """Tabulate what is certified."""
     before, days = fit.found.mean_square, np.unique(_days(fit.problem))
-    names = [p.name for p in work.built.network.parameters]
     spread = np.linalg.inv(work.found.jacobian.T @ work.found.jacobian)
-    normal = np.random.default_rng(0).multivariate_normal(np.zeros(len(names)), spread, _DRAWS)
+    normal = np.random.default_rng(0).multivariate_normal(np.zeros(len(spread)), spread, _DRAWS)
+    normal = np.pad(normal, ((0, 0), (0, 1)))  # a strength that no zone gets
     found = []
     for effect, zones in _zones(work.kinds).items():
         own = [k for k in work.kinds if k.effect == effect]
@@ -325,11 +333,8 @@ def _drivers(models: ModelComparison, fit: Fit, work: _Work, p_values: Mapping[s
             sizes, heat = np.zeros((_DRAWS, unit.shape[1])), np.zeros(unit.shape[1])
             for kind in own:
                 weight = kind.weights.get(zone, np.zeros(unit.shape[1]))
-                at = [names.index(p.name) for p in kind.chosen.effect.parameters] * (
-                    unit.shape[1] if kind.joined else 1
-                )
                 heat += weight * work.strengths(kind)
-                sizes += weight * (work.strengths(kind) + normal[:, at])
+                sizes += weight * (work.strengths(kind) + normal[:, work.columns(kind)])
             square = unit.T @ unit / len(unit)
             low, high = np.quantile(np.sqrt(np.einsum("di,ij,dj->d", sizes, square, sizes)), (0.05, 0.95))
             watts[zone], mean[zone] = float(np.sqrt(heat @ square @ heat)), float((unit @ heat).mean())

@@ -1,24 +1,27 @@
 """Heat of unknown cause: found where it is planted, certified on days that nothing was chosen on, handed on."""
 
 import json
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from calibration.diagnosis import correction
 from calibration.diagnosis.correction import Correction, correct
 from calibration.diagnosis.diagnosis import Diagnosis, diagnose
 from calibration.diagnosis.posterior import read_posterior
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.diagnosis.refit.refit import HeldOut, held_out
+from calibration.diagnosis.screen.kinds_of_heat import Kind
 from calibration.evaluation.case_model import case_model
 from calibration.evaluation.settings import ModelSettings
 from mpc.reports.diagnosis import diagnosis_summary, write_diagnosis
 from mpc.reports.diagnosis_words import diagnosis_verdict
 from thermal import Case, Telemetry
 from thermal.effects.catalogue import CATALOGUE
-from thermal.effects.unknown import UNKNOWN
+from thermal.effects.unknown import SUN, UNKNOWN
 from thermal.model.case_replay import free_runs, spin_up
 from thermal.pilot.building import pilot_building
 from thermal.pilot.twin import TwinRanges, TwinSettings, generate_twin
@@ -38,12 +41,23 @@ def twin() -> Case:
 
 @cache
 def draughty() -> Case:
-    """The same with what wind and cold take from two zones, by the model's own answer to that heat."""
-    case, zones = twin(), twin().building.zone_names[:2]
-    built = ModelComparison(case, ModelSettings(dx=1.0)).build({"heat_by_wind": zones})
+    """The same with what wind and cold take from two zones."""
+    return _planted("heat_by_wind", twin().building.zone_names[:2], ("heat_by_wind",), DRAUGHT)
+
+
+@cache
+def sunny() -> Case:
+    """The same with sun on its facades."""
+    return _planted(SUN, twin().building.zone_names, [f"{SUN}_{k}" for k in range(4)], 6.0)
+
+
+def _planted(effect: str, zones: Sequence[str], parameters: Sequence[str], size: float) -> Case:
+    """The same with heat of unknown cause, by the model's own answer to it."""
+    case = twin()
+    built = ModelComparison(case, ModelSettings(dx=1.0)).build({effect: zones})
     first, found = np.array([4]), []
-    for strength in (0.0, DRAUGHT):
-        theta = built.theta(dict.fromkeys((f"heat_by_wind@{z}" for z in zones), strength))
+    for strength in (0.0, size):
+        theta = built.theta(dict.fromkeys((f"{p}@{z}" for z in zones for p in parameters), strength))
         matrices = built.grid.matrices(theta, False)
         states, _ = spin_up(matrices, built.inputs, 0, first)
         found.append(free_runs(matrices, built.inputs, first, len(built.inputs) - 5, states)[0][0])
@@ -94,6 +108,18 @@ def test_nothing_is_certified_where_nothing_is_missing() -> None:
     models, fit, before = prepared(twin())
     found = correct(models, fit, before, before)
     assert found is None or found.before.mae - found.after.mae < 0.01
+
+
+def test_sun_on_planes_that_no_zone_has_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    models, fit, before = prepared(sunny())
+    facades = dict.fromkeys(sunny().building.zone_names, np.array([1.0, 1.0, 1.0, 1.0, 0.0]))
+    monkeypatch.setattr(correction, "candidates", lambda *_: [Kind(SUN, facades)])  # as under another's flat
+    found = correct(models, fit, before, prepared(twin())[2])
+    assert found is not None and found.after.mae < before.mae
+    (only,) = found.drivers
+    assert only.effect == SUN and set(only.zones) == set(facades)
+    assert all(low < only.watts[z] < high for z, (low, high) in only.interval.items())
+    assert {f"{SUN}_4@{zone}": 0.0 for zone in facades}.items() <= found.fit.values.items()
 
 
 @pytest.mark.long
