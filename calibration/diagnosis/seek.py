@@ -264,7 +264,7 @@ def _other_structures(about: _About, known: Sequence[str], ruled_out: Sequence[s
         kept = structures.kept
         if kept is not None and finds_people(kept):
             return _beside_people(about, structures, kept, whole)
-        if kept is not None and drawing_fails(structures.rungs, kept):  # names make up for it
+        if kept is not None and drawing_fails(fit, structures.rungs, kept):  # names make up for it
             part = whole.part(0.6, "free structure")
             free = search_free(models, structures.rungs, kept, known, ruled_out, part)
             structures = Structures(free.rungs, free.kept, free.kept.left)

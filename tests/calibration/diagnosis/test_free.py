@@ -132,10 +132,12 @@ def test_what_is_left_over_decides_where_it_was_judged() -> None:
 
 def test_a_structure_that_is_hardly_better_leaves_the_drawing_in_place() -> None:
     kept = SimpleNamespace(settings=SimpleNamespace(structure=SimpleNamespace(lumped=True)))
-    for better, fails in ((0.17, False), (0.15, True)):
-        rungs = (Rung("drawn", 0.2, 13, False), Rung("lumped", better, 100, True))
-        assert drawing_fails(rungs, cast("FittedCase", kept)) == fails
-        assert not drawing_fails(rungs, None)
+    sun, mixing = ({"solar_gain": ()}, {"solar_gain": (), "zone_mixing": ("hall", "office")})
+    for effects, better, fails in ((sun, 0.17, False), (sun, 0.15, True), (mixing, 0.17, True), (mixing, 0.185, False)):
+        found = cast("Fit", SimpleNamespace(effects=effects))
+        rungs = (Rung("named", 0.2, 13, False), Rung("lumped", better, 100, True))
+        assert drawing_fails(found, rungs, cast("FittedCase", kept)) == fails
+        assert not drawing_fails(found, rungs, None)
 
 
 def baseline(case: Case) -> tuple[ModelComparison, Fit]:
