@@ -5,14 +5,19 @@ another. Light at night needs no model to be a fault; what is likely only counts
 better that its calibration has not seen.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from calibration.diagnosis.decide.verdict import Candidate, Estimate, Verdict
 from calibration.evaluation.intervals import Interval
-from calibration.fit.calibrate import calibrate
-from calibration.fit.fitted_case import is_large
+from calibration.evaluation.n_step import EvaluationSettings
+from calibration.evaluation.settings import CalibrationSettings, ModelSettings, calibration_settings
+from calibration.fit.fitted_case import FittedCase, fit_case, is_large
+from calibration.fit.ladder import climb_from
+from calibration.fit.left_out import left_out
 from calibration.progress import Forward, Progress
 from thermal.case.case import Case
 from thermal.case.plausibility.anomaly import Anomaly
@@ -123,7 +128,7 @@ def suspected(case: Case) -> Iterator[Fault]:
 
 
 def mend(
-    case: Case, tune: Sequence[Interval], hold_out: Sequence[Interval], settings: dict[str, Any],
+    case: Case, tune: Sequence[Interval], hold_out: Sequence[Interval], settings: ModelSettings | Mapping[str, Any],
     progress: Progress | None = None,
 ) -> tuple[Fault, ...]:  # fmt: skip
     """Mend what the telemetry shows: what is certain, and what is likely where left-out days are predicted better.
@@ -134,8 +139,8 @@ def mend(
         Building and telemetry.
     tune, hold_out : sequence of Interval
         As in `calibrate`.
-    settings : dict
-        Of the calibrations, by name.
+    settings : ModelSettings, or mapping of str to Any
+        Of the calibrations; or these by name.
     progress : callable, optional
         Called with stage, done, total.
 
@@ -147,28 +152,50 @@ def mend(
     """
     if is_large(case.building.zone_names):
         return ()
-    whole = Forward(progress)
+    whole, chosen = Forward(progress), calibration_settings(settings)
     found: list[Fault] = []
-    error: Errors | None = None
+    drawn: FittedCase | None = None
+    kept: FittedCase | None = None
     tried: set[tuple[str, tuple[str, ...]]] = set()
 
-    def errors(of: Case) -> Errors:
-        result = calibrate(of, tune, hold_out, settings={**settings, "climb": True}, progress=whole.part(0.5))
-        left = [r.left_out_mae for r in result.rungs if r.chosen] or [result.calibrated["tuning"].metrics.mae]
-        return Errors(left[0], result.calibrated["held_out"].metrics.mae)
+    def fitted(of: Case, like: CalibrationSettings) -> FittedCase:
+        fit = fit_case(of, tune, hold_out, like, whole.part(0.5))
+        return replace(fit, left=left_out(fit.best, fit.tuned, chosen.spin_up_seconds))
 
     while True:
-        here = found[-1].mended if found else case
-        left = [f for f in suspected(here) if (f.effect, f.zones) not in tried]
+        of = found[-1].mended if found else case
+        left = [f for f in suspected(of) if (f.effect, f.zones) not in tried]
         fault = min(left, key=lambda f: not f.is_certain, default=None)  # what is certain first
         if fault is None:
             return tuple(found)
         tried.add((fault.effect, fault.zones))
-        error = error or errors(here)
-        without = errors(fault.mended)
-        if fault.is_certain or without.left_out < (1.0 - LEAST) * error.left_out:
-            found.append(replace(fault, before=error, after=without))
-            error = without
+        drawn = drawn or fitted(of, chosen)
+        if not fault.is_certain:  # most likely ones are none, and structures take ten times as long as a drawing
+            without = fitted(fault.mended, chosen)
+            if not _errors(without).left_out < _errors(drawn).left_out:
+                continue
+        kept = kept or _climbed(drawn, whole.part(0.5))
+        without = fitted(fault.mended, kept.settings)  # in the same structure: what is compared is telemetry
+        before, after = _errors(kept), _errors(without)
+        if fault.is_certain or after.left_out < (1.0 - LEAST) * before.left_out:
+            found.append(replace(fault, before=before, after=after))
+            drawn, kept = None, without
+
+
+def _climbed(drawn: FittedCase, progress: Progress) -> FittedCase:
+    """Fit a case in the structure that predicts left-out days best."""
+    _, kept, left = climb_from("drawn", drawn.best, drawn, progress)
+    return replace(drawn, left=left) if kept is None else kept
+
+
+def _errors(fitted: FittedCase) -> Errors:
+    """Errors of a fit; of too few days to leave any out, those that it was fitted to."""
+    model, horizon = replace(fitted.model, theta=fitted.best.theta), EvaluationSettings(fitted.settings.horizon)
+    tuning, held_out = (
+        model.evaluate(fitted.best.model, part, horizon).metrics.mae for part in (fitted.tuned, fitted.judged)
+    )
+    left = fitted.left
+    return Errors(tuning if left is None or np.isnan(left.mae) else left.mae, held_out)
 
 
 def with_faults(verdict: Verdict, faults: Sequence[Fault]) -> Verdict:

@@ -300,12 +300,25 @@ class Problem:
         z : ndarray, shape (n_free,)
             Point of the estimation scale [-].
         """
-        theta = self.theta(z)
-        cost, slopes = self.turned(model, theta)
+        return self.weigh(*self.residuals(model, self.theta(z)), z)
+
+    def weigh(self, error: FloatArray, slopes: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """As `weighted`, of errors that are known.
+
+        Parameters
+        ----------
+        error : ndarray, shape (n,)
+            Errors of all runs [K].
+        slopes : ndarray, shape (n, n_free)
+            Their derivatives with respect to θ [K per unit of θ].
+        z : ndarray, shape (n_free,)
+            Their point of the estimation scale [-].
+        """
+        cost, moved = self._turn(error, slopes, self.theta(z))
         weight = np.sqrt(self.effective_size() / cost.size) / self.deviation
         whiten = np.linalg.inv(np.linalg.cholesky(self.prior_covariance()))
         residual = np.concatenate([weight * cost, whiten @ (z - self.centre)])
-        return residual, np.vstack([weight * slopes, whiten])
+        return residual, np.vstack([weight * moved, whiten])
 
     def turned(self, model: SymbolicModel, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Unweighted data: roots of twice what the errors cost [K], and their Jacobian on the estimation scale.
@@ -317,7 +330,10 @@ class Problem:
         theta : ndarray, shape (n_parameter,)
             Parameter values [parameter units].
         """
-        error, slopes = self.residuals(model, theta)
+        return self._turn(*self.residuals(model, theta), theta)
+
+    def _turn(self, error: FloatArray, slopes: FloatArray, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """As `turned`, of errors that are known."""
         cost, turn = self._cost(error)
         return cost, (turn[:, None] * slopes) * self.slopes(theta)
 

@@ -1,6 +1,6 @@
 """Faults of the telemetry that it shows itself: mended where certain, or where left-out days are predicted better."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 from types import SimpleNamespace
 from typing import cast
@@ -67,24 +67,50 @@ def test_nothing_is_mended_where_nothing_is_wrong() -> None:
     assert mend(load_bundled_case(), (), (), SETTINGS) == ()
 
 
-@pytest.mark.parametrize(("certainty", "mended"), [("certain", True), ("likely", False)])
-def test_what_is_likely_only_must_predict_better(
-    monkeypatch: pytest.MonkeyPatch, certainty: Certainty, mended: bool
+@dataclass(frozen=True)
+class _Fit:
+    """Stands for a `FittedCase`."""
+
+    error: float
+    tuned: tuple[()] = ()
+    judged: tuple[()] = ()
+    settings: str = ""
+    best: None = None
+    left: None = None
+
+
+@pytest.mark.parametrize(
+    ("certainty", "drawn", "kept", "mended"),
+    [
+        ("certain", (1.0, 1.2), (1.0, 1.1), True),
+        ("likely", (1.0, 0.97), (1.0, 0.97), False),
+        ("likely", (1.0, 1.01), (1.0, 0.9), False),  # it is not asked in other structures
+        ("likely", (1.0, 0.97), (1.0, 0.9), True),
+    ],
+)
+def test_what_is_likely_only_must_predict_better_as_drawn_and_in_the_structure_that_is_kept(
+    monkeypatch: pytest.MonkeyPatch,
+    certainty: Certainty,
+    drawn: tuple[float, float],
+    kept: tuple[float, float],
+    mended: bool,
 ) -> None:
-    errors = iter([(1.0, 1.1), (0.97, 1.0)])
     (seen,) = (replace(f, seen=replace(f.seen, certainty=certainty)) for f in suspected(late()))
-
-    def calibrated(*_: object, **__: object) -> object:
-        left, held = next(errors)
-        rung = SimpleNamespace(chosen=True, left_out_mae=left)
-        return SimpleNamespace(
-            rungs=[rung], calibrated={"held_out": SimpleNamespace(metrics=SimpleNamespace(mae=held))}
-        )
-
-    monkeypatch.setattr("calibration.diagnosis.faults.calibrate", calibrated)
+    fits = {
+        (of, structure): _Fit(error, settings=structure)
+        for structure, errors in (("drawn", drawn), ("lumped", kept))
+        for of, error in zip(("late", "mended"), errors, strict=True)
+    }
+    monkeypatch.setattr(
+        "calibration.diagnosis.faults.fit_case",
+        lambda of, *given: fits["mended" if of is seen.mended else "late", "lumped" if "lumped" in given else "drawn"],
+    )
+    monkeypatch.setattr("calibration.diagnosis.faults._climbed", lambda *_: fits["late", "lumped"])
+    monkeypatch.setattr("calibration.diagnosis.faults.left_out", lambda *_: None)
+    monkeypatch.setattr("calibration.diagnosis.faults._errors", lambda fit: Errors(fit.error, 1.1 * fit.error))
     monkeypatch.setattr("calibration.diagnosis.faults.suspected", lambda case: [seen])
     found = mend(late(), (), (), SETTINGS)
-    assert [f.before.held_out for f in found] == [1.1] * mended
+    assert [f.before.held_out for f in found] == [1.1 * kept[0]] * mended
 
 
 def test_a_fault_comes_first_and_is_named() -> None:
