@@ -9,8 +9,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from calibration.diagnosis.decide.verdict import Candidate, Estimate, Verdict
 from calibration.evaluation.intervals import Interval
 from calibration.evaluation.n_step import EvaluationSettings
@@ -189,13 +187,10 @@ def _climbed(drawn: FittedCase, progress: Progress) -> FittedCase:
 
 
 def _errors(fitted: FittedCase) -> Errors:
-    """Errors of a fit; of too few days to leave any out, those that it was fitted to."""
-    model, horizon = replace(fitted.model, theta=fitted.best.theta), EvaluationSettings(fitted.settings.horizon)
-    tuning, held_out = (
-        model.evaluate(fitted.best.model, part, horizon).metrics.mae for part in (fitted.tuned, fitted.judged)
-    )
-    left = fitted.left
-    return Errors(tuning if left is None or np.isnan(left.mae) else left.mae, held_out)
+    """Errors of a fit; none on left-out days where there are too few to leave any out."""
+    model, settings = replace(fitted.model, theta=fitted.best.theta), EvaluationSettings(fitted.settings.horizon)
+    left = float("nan") if fitted.left is None else fitted.left.mae
+    return Errors(left, model.evaluate(fitted.best.model, fitted.judged, settings).metrics.mae)
 
 
 def with_faults(verdict: Verdict, faults: Sequence[Fault]) -> Verdict:
