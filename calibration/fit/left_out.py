@@ -197,7 +197,7 @@ def newton(
     point : ndarray, shape (n_free,)
         The estimate on the estimation scale [-].
     known : tuple of ndarray, optional
-        Their errors there, and the derivatives, as `Problem.residuals` gives them.
+        Their errors there [K], and the derivatives, as `Problem.residuals` gives them.
     """
     bounds = np.array(problem.bounds)
     for step in range(_STEPS):
