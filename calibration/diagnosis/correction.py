@@ -231,8 +231,7 @@ def _days(problem: Problem) -> IntArray:
 
 def _on(problem: Problem, days: IntArray) -> Problem:
     """Take the tuning runs of some days."""
-    inside = [np.isin(days_of_runs(problem, r), days) for r in problem.runs]
-    return on_runs(problem, [replace(r, starts=r.starts[own]) for r, own in zip(problem.runs, inside, strict=True)])
+    return on_runs(problem, [np.isin(days_of_runs(problem, r), days) for r in problem.runs])
 
 
 def _fit(

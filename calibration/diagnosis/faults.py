@@ -169,14 +169,12 @@ def mend(
         tried.add((fault.effect, fault.zones))
         drawn = drawn or fitted(of, chosen)
         if not fault.is_certain:  # most likely ones are none, and structures take ten times as long as a drawing
-            without = fitted(fault.mended, chosen)
-            if not _errors(without).left_out < _errors(drawn).left_out:
+            if not _left_out_mae(fitted(fault.mended, chosen)) < _left_out_mae(drawn):
                 continue
         kept = kept or _climbed(drawn, whole.part(0.5))
         without = fitted(fault.mended, kept.settings)  # in the same structure: what is compared is telemetry
-        before, after = _errors(kept), _errors(without)
-        if fault.is_certain or after.left_out < (1.0 - LEAST) * before.left_out:
-            found.append(replace(fault, before=before, after=after))
+        if fault.is_certain or _left_out_mae(without) < (1.0 - LEAST) * _left_out_mae(kept):
+            found.append(replace(fault, before=_errors(kept), after=_errors(without)))
             drawn, kept = None, without
 
 
@@ -186,11 +184,15 @@ def _climbed(drawn: FittedCase, progress: Progress) -> FittedCase:
     return replace(drawn, left=left) if kept is None else kept
 
 
+def _left_out_mae(fitted: FittedCase) -> float:
+    """Error on left-out days [K]; NaN where there are too few to leave any out."""
+    return float("nan") if fitted.left is None else fitted.left.mae
+
+
 def _errors(fitted: FittedCase) -> Errors:
-    """Errors of a fit; none on left-out days where there are too few to leave any out."""
+    """Errors of a fit."""
     model, settings = replace(fitted.model, theta=fitted.best.theta), EvaluationSettings(fitted.settings.horizon)
-    left = float("nan") if fitted.left is None else fitted.left.mae
-    return Errors(left, model.evaluate(fitted.best.model, fitted.judged, settings).metrics.mae)
+    return Errors(_left_out_mae(fitted), model.evaluate(fitted.best.model, fitted.judged, settings).metrics.mae)
 
 
 def with_faults(verdict: Verdict, faults: Sequence[Fault]) -> Verdict:

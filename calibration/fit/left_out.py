@@ -139,7 +139,7 @@ def left_out(fitted: Fitted, tuned: Sequence[Interval], spin_up_seconds: float) 
     parts, thetas, errors = [], [], [np.empty((0, problem.inputs.zone.shape[1]))]
     for own in (usable[first::_FOLDS] for first in range(min(_FOLDS, len(usable)))):
         kept = [_clear(problem.inputs.stamps, runs, problem.steps, [part for part, _ in own]) for runs in problem.runs]
-        fold = on_runs(problem, [replace(r, starts=r.starts[k]) for r, k in zip(problem.runs, kept, strict=True)])
+        fold = on_runs(problem, kept)
         if not fold.runs:
             continue
         theta = fold.theta(newton(fold, model, point, _rows(known, kept)))
@@ -168,17 +168,17 @@ def _rows(
     return np.concatenate([e[np.isfinite(e)] for e, _ in some]), np.concatenate([s[np.isfinite(e)] for e, s in some])
 
 
-def on_runs(problem: Problem, runs: Sequence[Runs]) -> Problem:
+def on_runs(problem: Problem, kept: Sequence[BoolArray]) -> Problem:
     """Take a problem of some of its runs, whose errors count in proportion.
 
     Parameters
     ----------
     problem : Problem
         Of all of them.
-    runs : sequence of Runs
-        Parts of its own; those without a run are left out.
+    kept : sequence of ndarray, each of shape (n_run,)
+        Which of its runs, interval by interval; an interval without any is left out.
     """
-    some = tuple(r for r in runs if r.starts.size)
+    some = tuple(replace(r, starts=r.starts[k]) for r, k in zip(problem.runs, kept, strict=True) if k.any())
     share = sum(r.starts.size for r in some) / sum(r.starts.size for r in problem.runs)
     return replace(problem, runs=some, effective=share * problem.effective_size())
 

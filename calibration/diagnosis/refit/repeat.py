@@ -1,6 +1,6 @@
 """Does it repeat? An effect of a building has the same strengths in both halves of the tuning days."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -81,7 +81,7 @@ def _halves(problem: Problem) -> tuple[Problem, Problem] | None:
         return None
     middle, made = starts[starts.size // 2], []
     for late in (False, True):
-        made.append(on_runs(problem, [replace(r, starts=r.starts[(r.starts >= middle) == late]) for r in problem.runs]))
+        made.append(on_runs(problem, [(r.starts >= middle) == late for r in problem.runs]))
     return made[0], made[1]
 
 

@@ -107,6 +107,7 @@ def test_what_is_likely_only_must_predict_better_as_drawn_and_in_the_structure_t
     )
     monkeypatch.setattr("calibration.diagnosis.faults._climbed", lambda *_: fits["late", "lumped"])
     monkeypatch.setattr("calibration.diagnosis.faults.left_out", lambda *_: None)
+    monkeypatch.setattr("calibration.diagnosis.faults._left_out_mae", lambda fit: fit.error)
     monkeypatch.setattr("calibration.diagnosis.faults._errors", lambda fit: Errors(fit.error, 1.1 * fit.error))
     monkeypatch.setattr("calibration.diagnosis.faults.suspected", lambda case: [seen])
     found = mend(late(), (), (), SETTINGS)
