@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from calibration.diagnosis.baseline import fit_baseline
 from calibration.diagnosis.decide.verdict import Verdict, doubted, gains_of, judge, summarised
 from calibration.diagnosis.faults import LEAST, Fault, mend, with_faults
-from calibration.diagnosis.free import Free, drawing_fails, held_against, search_free, with_recurring
+from calibration.diagnosis.free import Free, drawing_fails, held_against, must_be_better_by, search_free, with_recurring
 from calibration.diagnosis.handed_on import other_structures
 from calibration.diagnosis.known import reasons_of
 from calibration.diagnosis.people import finds_people, with_people
@@ -253,9 +253,9 @@ def _other_structures(about: _About, known: Sequence[str], ruled_out: Sequence[s
     """Hold other structures against a drawing that lacks something, and seek effects about a free one."""
     models, rounds, case = about.models, about.rounds, about.models.case
     unexplained, alone = judge(rounds, about.untestable).name == "unexplained", summarised(rounds).by_size_alone()
-    # a drawing that is known to lack what nothing explains has no advance
-    advance = 0.0 if unexplained else ADVANCE
     for fit in held_against(rounds, case.building.geometry_quality):
+        # a drawing that is known to lack what nothing explains has no advance
+        advance = 0.0 if unexplained else min(ADVANCE, must_be_better_by(fit.effects))
         beside = [] if GAINS in ruled_out else [rounds[0].before.effects]
         if beside and fit is rounds[-1].before and fit is not rounds[0].before:
             beside.append(fit.effects)
@@ -264,9 +264,9 @@ def _other_structures(about: _About, known: Sequence[str], ruled_out: Sequence[s
         kept = structures.kept
         if kept is not None and finds_people(kept):
             return _beside_people(about, structures, kept, whole)
-        if kept is not None and drawing_fails(fit, structures.rungs, kept):  # names make up for it
+        if kept is not None and drawing_fails(fit.effects, structures.rungs, kept):  # names make up for it
             part = whole.part(0.6, "free structure")
-            free = search_free(models, structures.rungs, kept, known, ruled_out, part)
+            free = search_free(models, rounds, structures.rungs, kept, known, ruled_out, part)
             structures = Structures(free.rungs, free.kept, free.kept.left)
             return _About(free.models, free.rounds, free.untestable, structures, free, free.left_over)
     if unexplained and (rounds[0].accepted or alone) and not is_large(case.building.zone_names):

@@ -12,8 +12,15 @@ import pytest
 
 from calibration.diagnosis.decide.verdict import chance_of, judge
 from calibration.diagnosis.diagnosis import Diagnosis, baseline_gap, diagnose
-from calibration.diagnosis.free import Free, drawing_fails, held_against, recurs, with_recurring
-from calibration.diagnosis.refit.comparison import Fit, ModelComparison
+from calibration.diagnosis.free import (
+    Free,
+    drawing_fails,
+    held_against,
+    only_beside_a_free_structure,
+    recurs,
+    with_recurring,
+)
+from calibration.diagnosis.refit.comparison import Effects, Fit, ModelComparison
 from calibration.diagnosis.refit.search import Round
 from calibration.diagnosis.screen.regular import Regular, regular
 from calibration.evaluation.settings import ModelSettings
@@ -132,9 +139,12 @@ def test_what_is_left_over_decides_where_it_was_judged() -> None:
 
 def test_a_structure_that_is_hardly_better_leaves_the_drawing_in_place() -> None:
     kept = SimpleNamespace(settings=SimpleNamespace(structure=SimpleNamespace(lumped=True)))
-    sun, mixing = ({"solar_gain": ()}, {"solar_gain": (), "zone_mixing": ("hall", "office")})
-    for effects, better, fails in ((sun, 0.17, False), (sun, 0.15, True), (mixing, 0.17, True), (mixing, 0.185, False)):
-        found = cast("Fit", SimpleNamespace(effects=effects))
+    sun: Effects = {"solar_gain": ()}
+    mixing, bias = ({**sun, name: ("hall", "office")} for name in ("zone_mixing", "sensor_bias"))
+    for found, better, fails in (
+        (sun, 0.17, False), (sun, 0.15, True), (mixing, 0.17, True), (mixing, 0.185, False),
+        (bias, 0.199, True), (bias, 0.2, False),
+    ):  # fmt: skip
         rungs = (Rung("named", 0.2, 13, False), Rung("lumped", better, 100, True))
         assert drawing_fails(found, rungs, cast("FittedCase", kept)) == fails
         assert not drawing_fails(found, rungs, None)
@@ -188,3 +198,11 @@ def test_heat_that_recurs_in_each_zone_is_peoples_where_it_takes_much_of_the_err
     assert {c.effect for c in told.candidates} == {c.effect for c in verdict.candidates}
     structure.settings.structure.recurring = False  # another structure predicts better
     assert with_recurring(verdict, free, rungs) == verdict
+
+
+def test_what_explains_nothing_beside_the_drawing_is_not_sought_beside_a_free_structure() -> None:
+    def of(**gains: float) -> Round:
+        return cast("Round", SimpleNamespace(gains=[SimpleNamespace(effect=e, gain=g) for e, g in gains.items()]))
+
+    rounds = [of(valve_leak=-5.0, solar_gain=-0.5, window_opening=0.0), of(valve_leak=-1.0, solar_gain=2.0)]
+    assert only_beside_a_free_structure(rounds) == {"valve_leak"}
