@@ -34,7 +34,7 @@ FAILS = 0.2
 #: better by a free structure, one 2 %, the others worse; measured ones with another fault that were told air between
 #: rooms, 16 % (a heater's power unknown) and 17 % (a wrong meter). A sensor that is wrong by as much all the time is
 #: the same as constant heat in its zone and those beside it, and a fault: rare, so that the drawing with it has to be
-#: better. With seven true ones it is, by 16 % and more; with those of the Twin House O5, which nobody knows of, it is
+#: better. With six true ones it is, by 15 % and more; with those of the Twin House O5, which nobody knows of, it is
 #: not.
 _IMITATED = {"zone_mixing": ADVANCE, "sensor_bias": 0.0}
 

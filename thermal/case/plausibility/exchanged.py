@@ -54,7 +54,7 @@ def exchanged_zones(case: Case) -> Iterator[Anomaly]:
     outdoor = case.boundary_temperatures()[OUTDOOR]
     names = [*map(str, temperatures), OUTDOOR]
     advice = "see which devices and sensors serve them; exchange the columns, or the zones in 'devices'"
-    found = set()
+    found: set[tuple[int, int]] = set()
     for i in range(len(names) - 1 if len(names) > 2 else 0):
         inside = temperatures.drop(columns=names[i]).mean(axis=1).mean()
         there = temperatures[names[i]]
@@ -67,16 +67,13 @@ def exchanged_zones(case: Case) -> Iterator[Anomaly]:
             return
     gains = heat_gains(case, temperatures, outdoor)
     needed = max(LEAST_GAIN, LEAST_GAIN_BY_STEP * len(case.stamps) * case.step / max(BLOCK, case.step))
-    for i, j in [pair for pair in combinations(range(len(names)), 2) if pair not in found]:
-        own, other = gains[i, i] + gains[j, j], gains[i, j] + gains[j, i]
-        least = min(gains[i, j] - gains[i, i], gains[j, i] - gains[j, j])
-        if other - own > max(needed, LEAST_SHARE * other) and least >= -MOST_LOST * other:
-            what = (
-                f"{_place(names[i])} and {_place(names[j])} look exchanged: the temperature of each follows the "
-                f"other's heat (which explains {other:.0f} of log-likelihood, its own {own:.0f})"
-            )
-            found.add((i, j))
-            yield _anomaly(case, [names[i], names[j]], what, "likely", advice)
+    for i, j, own, other in _followers(gains, needed):
+        what = (
+            f"{_place(names[i])} and {_place(names[j])} look exchanged: the temperature of each follows the "
+            f"other's heat (which explains {other:.0f} of log-likelihood, its own {own:.0f})"
+        )
+        found.add((i, j))
+        yield _anomaly(case, [names[i], names[j]], what, "likely", advice)
     setpoints = _setpoints(case)
     for i, j in combinations([k for k, name in enumerate(names) if name in setpoints], 2):
         if (i, j) in found:
@@ -141,6 +138,26 @@ def heat_gains(case: Case, temperatures: pd.DataFrame, outdoor: pd.Series) -> Fl
                 warms = (slopes.sum(axis=1) if case.step > BLOCK else slopes[:, 0]) > 0.0
                 gains[i, heated[mine]] = np.where(warms, 0.5 * there.sum() * np.log(without / left), 0.0)
     return gains
+
+
+def _followers(gains: FloatArray, needed: float) -> Iterator[tuple[int, int, float, float]]:
+    """Pairs of places that follow each other's heat, with what their own explains and the other's: the clearest first.
+
+    A place that is in a clearer pair is not in another: what follows its heat follows its neighbours' a little. A zone
+    without heat of its own has none that the other could follow.
+    """
+    outdoors, pairs = len(gains) - 1, []
+    heated = np.any(gains, axis=0)
+    for i, j in combinations(range(len(gains)), 2):
+        own, other = gains[i, i] + gains[j, j], gains[i, j] + gains[j, i]
+        gained = [gains[a, b] - gains[a, a] for a, b in ((i, j), (j, i)) if heated[b] or b == outdoors]
+        if other - own > max(needed, LEAST_SHARE * other) and min(gained) >= -MOST_LOST * other:
+            pairs.append((i, j, float(own), float(other)))
+    taken: set[int] = set()
+    for i, j, own, other in sorted(pairs, key=lambda p: p[2] - p[3]):
+        if not taken & {i, j}:
+            taken |= {i, j}
+            yield i, j, own, other
 
 
 def _alike(valid: BoolArray) -> Iterator[tuple[IntArray, BoolArray]]:
