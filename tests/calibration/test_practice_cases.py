@@ -77,3 +77,24 @@ def test_the_sun_of_a_free_structure_is_named_and_what_predicts_better_is_handed
     (chosen,) = (rung for rung in (*others, named) if rung.chosen)
     assert named.name == "found" and chosen.left_out_mae <= named.left_out_mae
     assert ("solar_gain" in found.structures.kept.settings.effects) == named.chosen
+
+
+#: One effect each that is named, or nothing.
+LABELLED = {
+    "practice_duct_loss": "duct_loss", "practice_flow_gain": "flow_gain",
+    "practice_ground_exchange": "ground_exchange", "practice_hidden_mass": "hidden_mass",
+    "practice_infiltration": "infiltration", "practice_interfloor_exchange": "interfloor_exchange",
+    "practice_internal_gains": "internal_gains", "practice_none_prbs": "", "practice_none_schedule": "",
+    "practice_roof_exchange": "roof_exchange", "practice_sensor_bias": "sensor_bias",
+    "practice_solar_gain": "solar_gain", "practice_zone_mixing": "zone_mixing",
+}  # fmt: skip
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("name", "effect"), LABELLED.items())
+def test_a_labelled_case_is_told_what_it_holds(name: str, effect: str) -> None:
+    verdict = seek(shared(name)).verdict
+    if effect:
+        assert verdict.name in ("named", "group") and effect in verdict.candidates[0].group
+    else:
+        assert verdict.name == "no_gap"
