@@ -168,14 +168,19 @@ def mend(
             return tuple(found)
         tried.add((fault.effect, fault.zones))
         drawn = drawn or fitted(of, chosen)
-        if not fault.is_certain:  # most likely ones are none, and structures take ten times as long as a drawing
-            if not _left_out_mae(fitted(fault.mended, chosen)) < _left_out_mae(drawn):
+        if fault.is_certain:
+            kept = kept or _climbed(drawn, whole.part(0.5))
+            without = fitted(fault.mended, kept.settings)
+        else:
+            mended = fitted(fault.mended, chosen)
+            if not mended.left_out_mae < drawn.left_out_mae:  # most are none, and structures take ten times as long
                 continue
-        kept = kept or _climbed(drawn, whole.part(0.5))
-        without = fitted(fault.mended, kept.settings)  # in the same structure: what is compared is telemetry
-        if fault.is_certain or _left_out_mae(without) < (1.0 - LEAST) * _left_out_mae(kept):
-            found.append(replace(fault, before=_errors(kept), after=_errors(without)))
-            drawn, kept = None, without
+            # a true fault can keep any structure from being better than the drawing: each telemetry has its own
+            kept, without = kept or _climbed(drawn, whole.part(0.5)), _climbed(mended, whole.part(0.5))
+            if not without.left_out_mae < (1.0 - LEAST) * kept.left_out_mae:
+                continue
+        found.append(replace(fault, before=_errors(kept), after=_errors(without)))
+        drawn, kept = None, without
 
 
 def _climbed(drawn: FittedCase, progress: Progress) -> FittedCase:
@@ -184,15 +189,10 @@ def _climbed(drawn: FittedCase, progress: Progress) -> FittedCase:
     return replace(drawn, left=left) if kept is None else kept
 
 
-def _left_out_mae(fitted: FittedCase) -> float:
-    """Error on left-out days [K]; NaN where there are too few to leave any out."""
-    return float("nan") if fitted.left is None else fitted.left.mae
-
-
 def _errors(fitted: FittedCase) -> Errors:
     """Errors of a fit."""
     model, settings = replace(fitted.model, theta=fitted.best.theta), EvaluationSettings(fitted.settings.horizon)
-    return Errors(_left_out_mae(fitted), model.evaluate(fitted.best.model, fitted.judged, settings).metrics.mae)
+    return Errors(fitted.left_out_mae, model.evaluate(fitted.best.model, fitted.judged, settings).metrics.mae)
 
 
 def with_faults(verdict: Verdict, faults: Sequence[Fault]) -> Verdict:

@@ -1,13 +1,13 @@
 """Where a drawing does not hold: the search goes on about a building whose masses, couplings and sun are free."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from calibration.diagnosis.decide.levels import RECURRING
 from calibration.diagnosis.decide.name import VerdictName
-from calibration.diagnosis.decide.verdict import Verdict
+from calibration.diagnosis.decide.verdict import Verdict, raw
 from calibration.diagnosis.known import reasons_of
 from calibration.diagnosis.refit.comparison import Effects, Fit, ModelComparison
 from calibration.diagnosis.refit.refit import beyond_a_step, held_out
@@ -33,10 +33,13 @@ FAILS = 0.2
 #: better by what any structure has to be. Of six houses and offices with open doors that are named one is predicted 7 %
 #: better by a free structure, one 2 %, the others worse; measured ones with another fault that were told air between
 #: rooms, 16 % (a heater's power unknown) and 17 % (a wrong meter). A sensor that is wrong by as much all the time is
-#: the same as constant heat in its zone and those beside it, and a fault: rare, so that the drawing with it has to be
-#: better. With six true ones it is, by 15 % and more; with those of the Twin House O5, which nobody knows of, it is
-#: not.
+#: the same as constant heat in its zone and those beside it, but for the air that is supplied, and a fault: rare, so
+#: that the drawing with it has to be better. With six true ones it is, by 15 % and more (three offices, two houses, a
+#: practice case); with those of the Twin House O5, which nobody knows of, it is not.
 _IMITATED = {"zone_mixing": ADVANCE, "sensor_bias": 0.0}
+
+#: Why an effect is not sought beside a free structure that has none by itself.
+_ALONE = "nothing of it shows beside the drawing, so that a free structure alone cannot tell it"
 
 #: Name of the sun, and of a structure with what was found.
 SUN, FOUND = "solar_gain", "found"
@@ -93,33 +96,32 @@ def held_against(rounds: Sequence[Round], quality: GeometryQuality) -> tuple[Fit
     return (rounds[0].before, final) if guessed else (final,)
 
 
-def must_be_better_by(found: Effects) -> float:
+def must_be_better_by(found: Collection[str]) -> float:
     """Share by which a free structure must predict left-out days better than the drawing with what was found [-].
 
     Parameters
     ----------
-    found : mapping of str to sequence of str
-        Effects, with their zones.
+    found : collection of str
+        Effects, without those that somebody knows to be there.
     """
     return min((_IMITATED[e] for e in found if e in _IMITATED), default=FAILS)
 
 
-def drawing_fails(found: Effects, rungs: Sequence[Rung], kept: FittedCase | None) -> bool:
+def drawing_fails(rungs: Sequence[Rung], kept: FittedCase | None, least: float = FAILS) -> bool:
     """Whether a free structure predicts days that it has not seen so much better that the drawing says little.
 
     Parameters
     ----------
-    found : mapping of str to sequence of str
-        Effects that the building as drawn has, with their zones.
     rungs : sequence of Rung
-        This building first.
+        The building as drawn with what was found first.
     kept : FittedCase or None
         What predicts left-out days best, where that is not the first.
+    least : float
+        From `must_be_better_by` [-].
     """
     if kept is None or not kept.settings.structure.lumped:
         return False
-    least = (1.0 - must_be_better_by(found)) * rungs[0].left_out_mae
-    return next(r for r in rungs if r.chosen).left_out_mae < least
+    return next(r for r in rungs if r.chosen).left_out_mae < (1.0 - least) * rungs[0].left_out_mae
 
 
 def recurs(rungs: Sequence[Rung]) -> tuple[float, float] | None:
@@ -180,20 +182,20 @@ def is_recurring(verdict: Verdict) -> bool:
 
 
 def only_beside_a_free_structure(rounds: Sequence[Round]) -> set[str]:
-    """Effects that explain nothing about the drawing, in any round: less than they cost.
+    """Effects that explain nothing beside the drawing, in any round: less than they cost, by tangents and fitted.
 
     What is wrong with two masses a zone looks like an effect too, and so does what is wrong with a drawing; but they
     are wrong in different ways. In a strip mall without any missing effect valves that leak in all ten zones gain 360
-    beside a free structure, and -5 beside the drawing. The sun of three measured and two simulated houses shows beside
-    both.
+    beside a free structure, and -5 beside the drawing. What a free structure may have by itself is none of these: the
+    sun, a gain that recurs and weather that is moved are held against the structure.
 
     Parameters
     ----------
     rounds : sequence of Round
         Of the search about the drawing.
     """
-    gains = [g for r in rounds for g in r.gains]
-    return {g.effect for g in gains} - {g.effect for g in gains if g.gain >= 0.0}
+    gains = [item for r in rounds for item in raw(r).items()]
+    return {e for e, _ in gains} - {e for e, gain in gains if gain >= 0.0} - {SUN, GAINS, CLOCK}
 
 
 def search_free(
@@ -211,7 +213,7 @@ def search_free(
     people live in are larger than those of an office whose heat is all metered, so that only what comes back counts as
     left over. What the structure itself has found and the catalogue has a name for is sought by its name: the sun, a
     gain that recurs from day to day, and weather that is moved by more than a step of the telemetry, until one is
-    found that predicts left-out days about as well. All else that is named shows beside the drawing, too. What is named
+    found that predicts left-out days about as well. Any other effect must show beside the drawing, too. What is named
     is handed on unless the structure alone predicts them better: its sun has apertures.
 
     Parameters
@@ -249,7 +251,7 @@ def search_free(
         )
         untestable = free.untestable()
         untestable |= reasons_of(known, ruled_out, untestable) | dict.fromkeys(own, "part of the structure")
-        untestable |= dict.fromkeys(alone - untestable.keys() - {sought}, "explains nothing beside the drawing")
+        untestable |= dict.fromkeys(alone - untestable.keys(), _ALONE)
         testable = [e for e in CATALOGUE if e not in untestable]
         baseline = free.fit({**own, **{e: () for e in known}}, [values_of(found)])
         made = search(free, baseline, held_out(free, baseline), testable, ahead.part(0.5))
@@ -259,12 +261,12 @@ def search_free(
         named = None
         if final.effects.keys() != baseline.effects.keys():
             named = _fit_named(models, replace(chosen, structure=structure), final, ahead.part(0.5))
-        if sought is None or (named is not None and _error(named) < (1.0 + ADVANCE) * _error(kept)):
+        if sought is None or (named is not None and named.left_out_mae < (1.0 + ADVANCE) * kept.left_out_mae):
             break
     if named is not None:
-        better = _error(kept) < _error(named)
+        better = kept.left_out_mae < named.left_out_mae
         rungs = tuple(replace(r, chosen=r.chosen and better) for r in rungs)
-        rungs += (Rung(FOUND, _error(named), len(named.best.problem.free), not better),)
+        rungs += (Rung(FOUND, named.left_out_mae, len(named.best.problem.free), not better),)
         kept = kept if better else named
     return Free(free, made, untestable, regular(free, final), kept, rungs)
 
@@ -276,8 +278,3 @@ def _fit_named(
     further = replace(settings, effects=dict(final.effects))
     named = fit_case(models.case, models.tuned, models.judged, further, progress, final)
     return replace(named, left=left_out(named.best, models.tuned, settings.spin_up_seconds))
-
-
-def _error(fitted: FittedCase) -> float:
-    """Error on left-out days [K]; without any as large as can be."""
-    return np.inf if fitted.left is None else fitted.left.mae

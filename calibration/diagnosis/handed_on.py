@@ -27,6 +27,7 @@ def other_structures(
     progress: Progress | None,
     advance: float,
     beside: Sequence[Effects] = (),
+    lumped_advance: float | None = None,
 ) -> tuple[tuple[Rung, ...], FittedCase | None, LeftOut | None]:
     """Fit other structures beside the final model, unless the building is large.
 
@@ -42,6 +43,8 @@ def other_structures(
         Share by which another's error on left-out days must be less [-].
     beside : sequence of mapping of str to sequence of str
         Effects beside which the heat of people with hours of their own is tried; it is not by default.
+    lumped_advance : float, optional
+        The share for lumped structures [-]; as for others by default.
 
     Returns
     -------
@@ -51,7 +54,7 @@ def other_structures(
     if is_large(final.built.network.zones):
         return (), None, None
     name = "named" if final.effects else "drawn"
-    return climb_from(name, final.known, models, progress, advance, beside)
+    return climb_from(name, final.known, models, progress, advance, beside, lumped_advance)
 
 
 def with_correction(

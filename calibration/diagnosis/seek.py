@@ -253,18 +253,19 @@ def _other_structures(about: _About, known: Sequence[str], ruled_out: Sequence[s
     """Hold other structures against a drawing that lacks something, and seek effects about a free one."""
     models, rounds, case = about.models, about.rounds, about.models.case
     unexplained, alone = judge(rounds, about.untestable).name == "unexplained", summarised(rounds).by_size_alone()
+    # a drawing that is known to lack what nothing explains has no advance
+    advance = 0.0 if unexplained else ADVANCE
     for fit in held_against(rounds, case.building.geometry_quality):
-        # a drawing that is known to lack what nothing explains has no advance
-        advance = 0.0 if unexplained else min(ADVANCE, must_be_better_by(fit.effects))
+        least = must_be_better_by([e for e in fit.effects if e not in known])
         beside = [] if GAINS in ruled_out else [rounds[0].before.effects]
         if beside and fit is rounds[-1].before and fit is not rounds[0].before:
             beside.append(fit.effects)
-        structures = Structures(*other_structures(models, fit, whole.part(0.5), advance, beside))
+        structures = Structures(*other_structures(models, fit, whole.part(0.5), advance, beside, min(advance, least)))
         about = about._replace(structures=structures)
         kept = structures.kept
         if kept is not None and finds_people(kept):
             return _beside_people(about, structures, kept, whole)
-        if kept is not None and drawing_fails(fit.effects, structures.rungs, kept):  # names make up for it
+        if kept is not None and drawing_fails(structures.rungs, kept, least):  # names make up for it
             part = whole.part(0.6, "free structure")
             free = search_free(models, rounds, structures.rungs, kept, known, ruled_out, part)
             structures = Structures(free.rungs, free.kept, free.kept.left)

@@ -70,6 +70,11 @@ class FittedCase:
         """Settings of the fit."""
         return self.settings
 
+    @property
+    def left_out_mae(self) -> float:
+        """Mean absolute error on tuning days that were left out [K]; NaN where none were."""
+        return float("nan") if self.left is None else self.left.mae
+
     def raise_if_interrupted(self) -> None:
         """Pass Ctrl-C on, which ended one of the starts and left the best of the others.
 

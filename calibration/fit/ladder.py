@@ -51,6 +51,9 @@ _EMITTERS: tuple[Unknown, Unknown] = ("floor", "radiator")
 #: Tuning days from which a gain that recurs from day to day is looked for [days]: it has to recur.
 _WEEK = 7.0
 
+#: Structures without a drawing.
+_LUMPED = ("lumped", "lumped floor", "recurring")
+
 #: A drawing whose people have hours of their own in each zone, and one that has what was found beside them.
 PEOPLE, BESIDE = "people", "people beside"
 
@@ -154,6 +157,7 @@ def climb_from(
     progress: Progress | None = None,
     advance: float = ADVANCE,
     beside: Sequence[Mapping[str, Sequence[str]]] = (),
+    lumped_advance: float | None = None,
 ) -> tuple[tuple[Rung, ...], FittedCase | None, LeftOut]:
     """Fit further structures beside a fitted model; the simplest is kept that predicts left-out days about best.
 
@@ -180,6 +184,8 @@ def climb_from(
     beside : sequence of mapping of str to sequence of str
         Effects beside which the heat of people is tried, with their zones: those that are known, and all that the
         fitted model has where it has others; it is not tried by default.
+    lumped_advance : float, optional
+        The share for lumped structures [-]; as for others by default.
 
     Returns
     -------
@@ -216,7 +222,7 @@ def climb_from(
         recurring = replace(lumped.settings, structure=replace(lumped.settings.structure, recurring=True))
         begun["recurring"] = recurring, lumped.best
         looked.append(ladder.look("recurring", _begun(given, *begun["recurring"])))
-    best = _best(looked, advance)
+    best = _best(looked, advance, advance if lumped_advance is None else lumped_advance)
     if looked[best].name in begun:
         looked[best] = ladder.fitted(looked[best].name, *begun[looked[best].name])
     kept = looked[best]
@@ -229,12 +235,13 @@ def climb_from(
     return rungs, None if kept.fit is None else replace(kept.fit, left=kept.left), kept.left
 
 
-def _best(looked: Sequence[_Looked], advance: float) -> int:
+def _best(looked: Sequence[_Looked], advance: float, lumped_advance: float = ADVANCE) -> int:
     """Which of some structures, the simplest first, predicts left-out days so much better that it is kept."""
     best = 0
     for number, other in enumerate(looked):
+        over_the_first = lumped_advance if other.name in _LUMPED else advance
         # films that follow the wind have no more parameters
-        least = 0.0 if other.name == "wind" else ADVANCE if best else advance
+        least = 0.0 if other.name == "wind" else ADVANCE if best else over_the_first
         if other.left.mae < (1.0 - least) * looked[best].left.mae:
             best = number
     return best

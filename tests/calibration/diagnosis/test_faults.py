@@ -71,7 +71,8 @@ def test_nothing_is_mended_where_nothing_is_wrong() -> None:
 class _Fit:
     """Stands for a `FittedCase`."""
 
-    error: float
+    of: str
+    left_out_mae: float
     tuned: tuple[()] = ()
     judged: tuple[()] = ()
     settings: str = ""
@@ -86,6 +87,8 @@ class _Fit:
         ("likely", (1.0, 0.97), (1.0, 0.97), False),
         ("likely", (1.0, 1.01), (1.0, 0.9), False),  # it is not asked in other structures
         ("likely", (1.0, 0.97), (1.0, 0.9), True),
+        ("likely", (np.nan, np.nan), (np.nan, np.nan), False),  # too few days to leave any out
+        ("certain", (np.nan, np.nan), (1.0, np.nan), True),
     ],
 )
 def test_what_is_likely_only_must_predict_better_as_drawn_and_in_the_structure_that_is_kept(
@@ -97,7 +100,7 @@ def test_what_is_likely_only_must_predict_better_as_drawn_and_in_the_structure_t
 ) -> None:
     (seen,) = (replace(f, seen=replace(f.seen, certainty=certainty)) for f in suspected(late()))
     fits = {
-        (of, structure): _Fit(error, settings=structure)
+        (of, structure): _Fit(of, error, settings=structure)
         for structure, errors in (("drawn", drawn), ("lumped", kept))
         for of, error in zip(("late", "mended"), errors, strict=True)
     }
@@ -105,13 +108,12 @@ def test_what_is_likely_only_must_predict_better_as_drawn_and_in_the_structure_t
         "calibration.diagnosis.faults.fit_case",
         lambda of, *given: fits["mended" if of is seen.mended else "late", "lumped" if "lumped" in given else "drawn"],
     )
-    monkeypatch.setattr("calibration.diagnosis.faults._climbed", lambda *_: fits["late", "lumped"])
+    monkeypatch.setattr("calibration.diagnosis.faults._climbed", lambda drawn, _: fits[drawn.of, "lumped"])
     monkeypatch.setattr("calibration.diagnosis.faults.left_out", lambda *_: None)
-    monkeypatch.setattr("calibration.diagnosis.faults._left_out_mae", lambda fit: fit.error)
-    monkeypatch.setattr("calibration.diagnosis.faults._errors", lambda fit: Errors(fit.error, 1.1 * fit.error))
+    monkeypatch.setattr("calibration.diagnosis.faults._errors", lambda fit: Errors(fit.left_out_mae, 1.0))
     monkeypatch.setattr("calibration.diagnosis.faults.suspected", lambda case: [seen])
     found = mend(late(), (), (), SETTINGS)
-    assert [f.before.held_out for f in found] == [1.1 * kept[0]] * mended
+    assert [(f.before.left_out, f.after.left_out) for f in found] == [pytest.approx(kept, nan_ok=True)] * mended
 
 
 def test_a_fault_comes_first_and_is_named() -> None:

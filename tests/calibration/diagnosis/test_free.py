@@ -16,11 +16,12 @@ from calibration.diagnosis.free import (
     Free,
     drawing_fails,
     held_against,
+    must_be_better_by,
     only_beside_a_free_structure,
     recurs,
     with_recurring,
 )
-from calibration.diagnosis.refit.comparison import Effects, Fit, ModelComparison
+from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.diagnosis.refit.search import Round
 from calibration.diagnosis.screen.regular import Regular, regular
 from calibration.evaluation.settings import ModelSettings
@@ -139,15 +140,15 @@ def test_what_is_left_over_decides_where_it_was_judged() -> None:
 
 def test_a_structure_that_is_hardly_better_leaves_the_drawing_in_place() -> None:
     kept = SimpleNamespace(settings=SimpleNamespace(structure=SimpleNamespace(lumped=True)))
-    sun: Effects = {"solar_gain": ()}
-    mixing, bias = ({**sun, name: ("hall", "office")} for name in ("zone_mixing", "sensor_bias"))
+    sun, mixing, bias = ["solar_gain"], ["solar_gain", "zone_mixing"], ["solar_gain", "sensor_bias"]
     for found, better, fails in (
         (sun, 0.17, False), (sun, 0.15, True), (mixing, 0.17, True), (mixing, 0.185, False),
         (bias, 0.199, True), (bias, 0.2, False),
     ):  # fmt: skip
         rungs = (Rung("named", 0.2, 13, False), Rung("lumped", better, 100, True))
-        assert drawing_fails(found, rungs, cast("FittedCase", kept)) == fails
-        assert not drawing_fails(found, rungs, None)
+        least = must_be_better_by(found)
+        assert drawing_fails(rungs, cast("FittedCase", kept), least) == fails
+        assert not drawing_fails(rungs, None, least)
 
 
 def baseline(case: Case) -> tuple[ModelComparison, Fit]:
@@ -201,8 +202,15 @@ def test_heat_that_recurs_in_each_zone_is_peoples_where_it_takes_much_of_the_err
 
 
 def test_what_explains_nothing_beside_the_drawing_is_not_sought_beside_a_free_structure() -> None:
-    def of(**gains: float) -> Round:
-        return cast("Round", SimpleNamespace(gains=[SimpleNamespace(effect=e, gain=g) for e, g in gains.items()]))
+    (r, *_) = diagnosed().rounds
+    assert r.accepted is not None
 
-    rounds = [of(valve_leak=-5.0, solar_gain=-0.5, window_opening=0.0), of(valve_leak=-1.0, solar_gain=2.0)]
-    assert only_beside_a_free_structure(rounds) == {"valve_leak"}
+    def of(**gains: float) -> Round:
+        return replace(r, gains=tuple(replace(r.gains[0], effect=e, gain=g) for e, g in gains.items()), refits=())
+
+    less = {"internal_gains": -2.0, "valve_leak": -5.0, "window_opening": 0.0}  # a gain that recurs is the structure's
+    rounds = [of(solar_opaque=-0.5, **less), of(solar_opaque=2.0, valve_leak=-1.0)]
+    without = [replace(each, accepted=None, pair=None) for each in rounds]
+    assert only_beside_a_free_structure(without) == {"valve_leak"}
+    fitted = replace(r.accepted, screened=replace(r.gains[0], effect="valve_leak", gain=-5.0), gain=20.0, counts=True)
+    assert only_beside_a_free_structure([replace(each, refits=(fitted,)) for each in without]) == set()

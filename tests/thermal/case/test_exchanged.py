@@ -6,6 +6,7 @@ from thermal.case.plausibility.exchanged import _followers
 
 #: A hall without heat of its own, living room, bath, and the outdoors, which have none either.
 HALL, LIVING, BATH, OUTDOORS = range(4)
+BARE = frozenset({HALL})
 
 
 def gains(**explained: tuple[int, int, float]) -> np.ndarray:
@@ -22,11 +23,12 @@ def test_of_pairs_that_share_a_place_the_clearest_is_told() -> None:
 
 def test_a_zone_without_heat_can_be_exchanged_though_it_warms_with_its_neighbour() -> None:
     exchanged = gains(a=(HALL, LIVING, 3200.0), b=(LIVING, LIVING, 320.0))
-    assert list(_followers(exchanged, 30.0)) == [(HALL, LIVING, 320.0, 3200.0)]
+    assert list(_followers(exchanged, 30.0, BARE)) == [(HALL, LIVING, 320.0, 3200.0)]
+    assert not list(_followers(exchanged, 30.0))
     as_they_are = gains(a=(HALL, LIVING, 320.0), b=(LIVING, LIVING, 3200.0))
-    assert not list(_followers(as_they_are, 30.0))
+    assert not list(_followers(as_they_are, 30.0, BARE))
     by_the_door = gains(a=(HALL, LIVING, 3200.0), b=(LIVING, LIVING, 1700.0))
-    assert not list(_followers(by_the_door, 30.0))
+    assert not list(_followers(by_the_door, 30.0, BARE))
 
 
 def test_a_zone_with_heat_must_not_follow_its_own() -> None:
@@ -36,4 +38,4 @@ def test_a_zone_with_heat_must_not_follow_its_own() -> None:
 
 def test_the_outdoors_are_no_zone_without_heat() -> None:
     warm = gains(a=(OUTDOORS, LIVING, 3200.0), b=(LIVING, LIVING, 320.0))
-    assert not list(_followers(warm, 30.0))
+    assert not list(_followers(warm, 30.0, BARE))

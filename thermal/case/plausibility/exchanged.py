@@ -54,7 +54,7 @@ def exchanged_zones(case: Case) -> Iterator[Anomaly]:
     outdoor = case.boundary_temperatures()[OUTDOOR]
     names = [*map(str, temperatures), OUTDOOR]
     advice = "see which devices and sensors serve them; exchange the columns, or the zones in 'devices'"
-    found: set[tuple[int, int]] = set()
+    found: set[int] = set()
     for i in range(len(names) - 1 if len(names) > 2 else 0):
         inside = temperatures.drop(columns=names[i]).mean(axis=1).mean()
         there = temperatures[names[i]]
@@ -67,16 +67,19 @@ def exchanged_zones(case: Case) -> Iterator[Anomaly]:
             return
     gains = heat_gains(case, temperatures, outdoor)
     needed = max(LEAST_GAIN, LEAST_GAIN_BY_STEP * len(case.stamps) * case.step / max(BLOCK, case.step))
-    for i, j, own, other in _followers(gains, needed):
-        what = (
-            f"{_place(names[i])} and {_place(names[j])} look exchanged: the temperature of each follows the "
-            f"other's heat (which explains {other:.0f} of log-likelihood, its own {own:.0f})"
-        )
-        found.add((i, j))
+    bare = frozenset(k for k, zone in enumerate(names[:-1]) if not case.building.devices_of(zone))
+    for i, j, own, other in _followers(gains, needed, bare):
+        first, second = (_place(names[k]) for k in ((i, j) if j not in bare else (j, i)))
+        follows = "the temperature of each follows the other's heat"
+        if bare & {i, j}:
+            follows = f"the temperature of {first}, which has no heat of its own, follows that of {second} alone"
+        by = f"by {other:.0f} of log-likelihood, as they are {own:.0f}"
+        what = f"{first} and {second} look exchanged: {follows} ({by})"
+        found |= {i, j}
         yield _anomaly(case, [names[i], names[j]], what, "likely", advice)
     setpoints = _setpoints(case)
     for i, j in combinations([k for k, name in enumerate(names) if name in setpoints], 2):
-        if (i, j) in found:
+        if found & {i, j}:
             continue
         off = [_distance(temperatures[names[a]], setpoints[names[a]]) for a in (i, j)]
         near = [_distance(temperatures[names[a]], setpoints[names[b]]) for a, b in ((i, j), (j, i))]
@@ -140,17 +143,18 @@ def heat_gains(case: Case, temperatures: pd.DataFrame, outdoor: pd.Series) -> Fl
     return gains
 
 
-def _followers(gains: FloatArray, needed: float) -> Iterator[tuple[int, int, float, float]]:
+def _followers(
+    gains: FloatArray, needed: float, bare: frozenset[int] = frozenset()
+) -> Iterator[tuple[int, int, float, float]]:
     """Pairs of places that follow each other's heat, with what their own explains and the other's: the clearest first.
 
-    A place that is in a clearer pair is not in another: what follows its heat follows its neighbours' a little. A zone
-    without heat of its own has none that the other could follow.
+    A place that is in a clearer pair is not in another: what follows its heat follows its neighbours' a little. Of a
+    pair one of which is bare, without any device, that one alone can follow the other's heat.
     """
-    outdoors, pairs = len(gains) - 1, []
-    heated = np.any(gains, axis=0)
+    pairs = []
     for i, j in combinations(range(len(gains)), 2):
         own, other = gains[i, i] + gains[j, j], gains[i, j] + gains[j, i]
-        gained = [gains[a, b] - gains[a, a] for a, b in ((i, j), (j, i)) if heated[b] or b == outdoors]
+        gained = [gains[a, b] - gains[a, a] for a, b in ((i, j), (j, i)) if b not in bare]
         if other - own > max(needed, LEAST_SHARE * other) and min(gained) >= -MOST_LOST * other:
             pairs.append((i, j, float(own), float(other)))
     taken: set[int] = set()
