@@ -15,7 +15,7 @@ class Levels:
         Its share of that by which zone temperatures change over the horizon, for a model is as wrong as it is driven
         hard [-]: the larger of the two counts.
     left_in_a_zone : float
-        What counts instead where one zone has most of the squared error [K].
+        What counts in place of ``left_over`` where one zone has most of the squared error [K].
     concentrated : float
         Squared error of a zone over the mean of all from which it has [-].
     explained, explained_of_much : float

@@ -57,10 +57,13 @@ class Summary(Plain):
         """
         if self.comes_back is not None:
             return self.comes_back
-        return self.left > max(levels.left_over, levels.left_of_change * self.change) or self._in_a_zone(levels)
+        return self._large(levels.left_over, levels) or self._in_a_zone(levels)
 
     def _in_a_zone(self, levels: Levels) -> bool:
-        return self.left > levels.left_in_a_zone and self.peak > levels.concentrated
+        return self._large(levels.left_in_a_zone, levels) and self.peak > levels.concentrated
+
+    def _large(self, least: float, levels: Levels) -> bool:
+        return self.left > max(least, levels.left_of_change * self.change)
 
     def _shows(self, levels: Levels) -> bool:
         return self.generic > max(levels.generic, self.generic_level)

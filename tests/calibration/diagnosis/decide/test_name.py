@@ -22,6 +22,8 @@ FOUND = replace(QUIET, accepted=True, group=1, tuning=0.5, held_out=0.3)
         (replace(QUIET, generic=9.0), "unexplained"),
         (replace(QUIET, generic=9.0, generic_level=10.0), "no_gap"),  # the case's own nulls show as much
         (replace(QUIET, left=0.3), "unexplained"),
+        (replace(QUIET, left=0.15, peak=4.0), "unexplained"),  # in one zone
+        (replace(QUIET, left=0.15, peak=4.0, change=2.0), "no_gap"),  # which is driven hard
         (FOUND, "named"),
         (replace(FOUND, group=3), "group"),
         (replace(FOUND, group=9), "unexplained"),
