@@ -107,7 +107,7 @@ def must_be_better_by(found: Collection[str]) -> float:
     return min((_IMITATED[e] for e in found if e in _IMITATED), default=FAILS)
 
 
-def drawing_fails(rungs: Sequence[Rung], kept: FittedCase | None, least: float = FAILS) -> bool:
+def drawing_fails(rungs: Sequence[Rung], kept: FittedCase | None, least: float) -> bool:
     """Whether a free structure predicts days that it has not seen so much better that the drawing says little.
 
     Parameters
