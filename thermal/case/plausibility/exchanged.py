@@ -72,7 +72,7 @@ def exchanged_zones(case: Case) -> Iterator[Anomaly]:
         first, second = (_place(names[k]) for k in ((i, j) if j not in bare else (j, i)))
         follows = "the temperature of each follows the other's heat"
         if bare & {i, j}:
-            follows = f"the temperature of {first}, which has no heat of its own, follows that of {second} alone"
+            follows = f"{first}, which has no heat of its own, follows the heat of {second} more than {second} does"
         by = f"by {other:.0f} of log-likelihood, as they are {own:.0f}"
         what = f"{first} and {second} look exchanged: {follows} ({by})"
         found |= {i, j}
