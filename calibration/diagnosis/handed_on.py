@@ -15,7 +15,7 @@ from calibration.evaluation.n_step import Evaluation, EvaluationSettings
 from calibration.evaluation.simple_models import with_yardsticks
 from calibration.fit.estimate import tune
 from calibration.fit.fitted_case import FittedCase, is_large
-from calibration.fit.ladder import climb_from
+from calibration.fit.ladder import ADVANCE, climb_from
 from calibration.fit.left_out import LeftOut, left_out
 from calibration.fit.result import CalibrationResult, Rung, effect_entries
 from calibration.progress import Progress
@@ -27,7 +27,7 @@ def other_structures(
     progress: Progress | None,
     advance: float,
     beside: Sequence[Effects] = (),
-    lumped_advance: float | None = None,
+    lumped_advance: float = ADVANCE,
 ) -> tuple[tuple[Rung, ...], FittedCase | None, LeftOut | None]:
     """Fit other structures beside the final model, unless the building is large.
 
@@ -43,8 +43,8 @@ def other_structures(
         Share by which another's error on left-out days must be less [-].
     beside : sequence of mapping of str to sequence of str
         Effects beside which the heat of people with hours of their own is tried; it is not by default.
-    lumped_advance : float, optional
-        The share for lumped structures [-]; as for others by default.
+    lumped_advance : float
+        The same for lumped structures [-].
 
     Returns
     -------

@@ -157,7 +157,7 @@ def climb_from(
     progress: Progress | None = None,
     advance: float = ADVANCE,
     beside: Sequence[Mapping[str, Sequence[str]]] = (),
-    lumped_advance: float | None = None,
+    lumped_advance: float = ADVANCE,
 ) -> tuple[tuple[Rung, ...], FittedCase | None, LeftOut]:
     """Fit further structures beside a fitted model; the simplest is kept that predicts left-out days about best.
 
@@ -184,8 +184,8 @@ def climb_from(
     beside : sequence of mapping of str to sequence of str
         Effects beside which the heat of people is tried, with their zones: those that are known, and all that the
         fitted model has where it has others; it is not tried by default.
-    lumped_advance : float, optional
-        The share for lumped structures [-]; as for others by default.
+    lumped_advance : float
+        The same for lumped structures [-].
 
     Returns
     -------
@@ -222,7 +222,7 @@ def climb_from(
         recurring = replace(lumped.settings, structure=replace(lumped.settings.structure, recurring=True))
         begun["recurring"] = recurring, lumped.best
         looked.append(ladder.look("recurring", _begun(given, *begun["recurring"])))
-    best = _best(looked, advance, advance if lumped_advance is None else lumped_advance)
+    best = _best(looked, advance, lumped_advance)
     if looked[best].name in begun:
         looked[best] = ladder.fitted(looked[best].name, *begun[looked[best].name])
     kept = looked[best]

@@ -143,9 +143,7 @@ def heat_gains(case: Case, temperatures: pd.DataFrame, outdoor: pd.Series) -> Fl
     return gains
 
 
-def _followers(
-    gains: FloatArray, needed: float, bare: frozenset[int] = frozenset()
-) -> Iterator[tuple[int, int, float, float]]:
+def _followers(gains: FloatArray, needed: float, bare: frozenset[int]) -> Iterator[tuple[int, int, float, float]]:
     """Pairs of places that follow each other's heat, with what their own explains and the other's: the clearest first.
 
     A place that is in a clearer pair is not in another: what follows its heat follows its neighbours' a little. Of a
