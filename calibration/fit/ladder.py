@@ -330,10 +330,13 @@ class _Ladder:
             if GAINS in (*base.effects, *others) or days_of(self.given.tuned) < _WEEK:
                 continue
             daily = replace(base, effects={**base.effects, **others, GAINS: zones})
-            looks = [replace(daily, fixed={**base.fixed, **fixed}) for fixed in (waves, {})]
-            always, course = (self.look(name, _begun(self.given, settings, fitted)) for settings in looks)
-            if course.left.mae < min(error, _RECURS * always.left.mae):
-                always, course = (self.fitted(name, settings, fitted) for settings in looks)
+            mean = replace(daily, fixed={**base.fixed, **waves})
+            course = self.look(name, _begun(self.given, daily, fitted))
+            if not course.left.mae < error:
+                continue
+            always = self.look(name, _begun(self.given, mean, fitted))
+            if course.left.mae < _RECURS * always.left.mae:
+                course, always = self.fitted(name, daily, fitted), self.fitted(name, mean, fitted)
                 found += [course] if course.left.mae < _RECURS * always.left.mae else []
         return found
 

@@ -235,11 +235,13 @@ def bounded_step(
     ndarray, shape (p,)
         The step [as the caller's x].
     """
-    q, r = np.linalg.qr(jacobian)  # as many rows as columns: a tenth of the work
+    # as many rows as columns: a tenth of the work; the last column is Q' of the target, so that Q itself is not needed
+    whole = np.asarray(np.linalg.qr(np.column_stack([jacobian, -residual]), mode="r"))[: lower.size]
+    r, turned = whole[:, :-1], whole[:, -1]
     if damping is None:
         bounds = np.minimum(lower, -1e-12), np.maximum(upper, 1e-12)
-        return np.asarray(lsq_linear(r, -q.T @ residual, bounds).x)
-    target = np.concatenate([-q.T @ residual, np.zeros(damping.size)])
+        return np.asarray(lsq_linear(r, turned, bounds).x)
+    target = np.concatenate([turned, np.zeros(damping.size)])
     found = lsq_linear(np.vstack([r, np.diag(damping)]), target, (lower, upper), method="bvls").x
     return np.asarray(np.clip(found, lower, upper))
 

@@ -285,11 +285,15 @@ class Stepper:
         """Source of the sensitivities in a stage, (n, n_parameter m): ``-dC (T - T_base) - Δt d[K, -B] [T; u]``."""
         capacity, flow = self._stacks
         n, m = change.shape
-        out = np.zeros((self.n_parameter, m, n))  # one parameter after the other, as the solver wants its columns
+        sparse = sp.issparse(self._stiffness)
+        # what solves wants its columns whole if sparse, parameter by parameter, and its rows whole if dense
+        out = np.zeros((self.n_parameter, m, n)).transpose(2, 0, 1) if sparse else np.zeros((n, self.n_parameter, m))
         for (which, matrix), x in ((capacity, -change), (flow, -self.step * full)):
             if which:
-                out[which] += np.asarray(matrix @ x).reshape(len(which), n, m).transpose(0, 2, 1)
-        return out.reshape(self.n_parameter * m, n).T
+                product = np.asarray(matrix @ x)
+                moved = product.reshape(len(which), n, m).transpose(1, 0, 2) if sparse else product
+                out[:, which] += moved.reshape(n, len(which), m)
+        return out.reshape(n, -1)
 
     def _mixing(self, airflow: FloatArray | None) -> FloatArray | None:
         """M for each run, shape (m, n_zone, n_zone) [W/K]: air that enters a zone at another zone's temperature."""
@@ -310,9 +314,9 @@ class Stepper:
         response, gain = self.response
         m, n_zone = mixing.shape[:2]
         scale = implicit * self.step
+        closed = mixing @ np.linalg.inv(np.eye(n_zone) - scale * (gain @ mixing))
         zone = np.asarray(self.matrices.observation @ free).reshape(n_zone, -1, m).transpose(2, 0, 1)
-        zone = np.linalg.solve(np.eye(n_zone) - scale * (gain @ mixing), zone)
-        heat = (mixing @ zone).transpose(1, 2, 0).reshape(n_zone, -1)
+        heat = (closed @ zone).transpose(1, 2, 0).reshape(n_zone, -1)
         return np.asarray(free + scale * (response @ heat))
 
     def _flow_in(self, states: FloatArray, boundary: FloatArray, mixing: FloatArray | None) -> FloatArray:
@@ -348,11 +352,13 @@ class Stepper:
 
 
 def _stacked(sensitivities: list[Matrix]) -> tuple[list[int], Matrix]:
-    """Which sensitivities are not zero, and these on top of each other."""
+    """Which sensitivities are not zero, and these on top of each other; row by row where they are dense."""
     sparse = bool(sensitivities) and sp.issparse(sensitivities[0])
     which = [j for j, m in enumerate(sensitivities) if (m.nnz if sparse else np.any(m))]
     chosen = [sensitivities[j] for j in which]
-    return which, sp.vstack(chosen).tocsr() if sparse and chosen else np.vstack(chosen) if chosen else np.empty((0, 0))
+    if not chosen:
+        return which, np.empty((0, 0))
+    return which, sp.vstack(chosen).tocsr() if sparse else np.stack(chosen, axis=1).reshape(-1, chosen[0].shape[1])
 
 
 def _combine(weights: tuple[float, ...], trail: list[FloatArray]) -> FloatArray:
