@@ -13,6 +13,7 @@ from calibration.diagnosis.correction import CORRECTED, Correction, correct
 from calibration.diagnosis.decide.verdict import Verdict, chance_of
 from calibration.diagnosis.decide.where import DriftCurve, Where, drift_of, where_it_lies
 from calibration.diagnosis.faults import Fault
+from calibration.diagnosis.free import is_recurring
 from calibration.diagnosis.handed_on import fit_content, judge_handed_on, other_structures, with_correction
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.diagnosis.refit.how_far import Step
@@ -25,7 +26,7 @@ from calibration.estimation.disturbance import DisturbanceModel
 from calibration.evaluation.intervals import Interval
 from calibration.evaluation.n_step import Evaluation
 from calibration.evaluation.settings import ModelSettings
-from calibration.fit.ladder import ADVANCE
+from calibration.fit.ladder import ADVANCE, GAINS
 from calibration.fit.result import CalibrationResult, Rung, SolverReport
 from calibration.progress import Forward, Progress
 from calibration.results import Axes, Result, plain
@@ -74,7 +75,8 @@ class Diagnosis(Result):
     steps : tuple of Step
         How far each accepted effect closes the gap.
     gap, floor : float
-        Held-out mean absolute error of the calibrated baseline, and that below which nothing found lowers it [K].
+        Held-out mean absolute error of the calibrated baseline, faults of the telemetry mended, and that below which
+        nothing found lowers it [K].
     p_value : float
         Probability of as large a gain where nothing is missing [-].
     detectable : mapping of str to float
@@ -150,6 +152,21 @@ class Diagnosis(Result):
         return self.rounds[-1].after
 
     @property
+    def found(self) -> tuple[str, ...]:
+        """Effects that were found: faults of the telemetry, then those that were accepted, and people's heat in a gain.
+
+        Neither those that were known nor the clock of a structure that moves heat in time.
+        """
+        begun, faults = self.rounds[0].before.effects, [f.effect for f in self.faults]
+        accepted = [effect for effect in self.final.effects if effect not in begun]
+        return tuple(dict.fromkeys((*faults, *accepted, *([GAINS] if is_recurring(self.verdict) else []))))
+
+    @property
+    def gap_as_read(self) -> float:
+        """Held-out mean absolute error of the calibrated baseline before faults of the telemetry were mended [K]."""
+        return self.faults[0].before.held_out if self.faults else self.gap
+
+    @property
     def drawing_fails(self) -> bool:
         """Whether the drawing does not hold, so that effects were sought about a free structure."""
         return self.settings.structure.lumped
@@ -176,7 +193,7 @@ class Diagnosis(Result):
         return {
             "verdict": self.verdict.name,
             "gap": {
-                "mae": self.faults[0].before.held_out if self.faults else self.gap,
+                "mae": self.gap_as_read,
                 "floor": self.floor,
                 "p_value": self.p_value,
                 "smallest_detectable_watts": self.detectable,
@@ -256,7 +273,7 @@ class Diagnosis(Result):
         return rows.set_index("effect").drop(columns="parameters")
 
     def _summary(self) -> str:
-        found = f", with {' + '.join(self.final.effects)} {self.steps[-1].after:.3f} K" if self.steps else ""
+        found = f", with {' + '.join(self.found)} {self.steps[-1].after:.3f} K" if self.steps else ""
         return f"{self.case}, {self.verdict.name}; held-out error {self.gap:.3f} K{found}"
 
     def _draw(self, axes: Axes) -> None:

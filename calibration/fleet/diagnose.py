@@ -110,11 +110,9 @@ def _diagnosed(case: Case, settings: Settings) -> Done:
     intervals, given = split_intervals(settings)
     tune, hold_out = read_intervals(intervals, case)
     result = diagnose(case, tune, hold_out, **given)
-    verdict, known = result.verdict.name, given.get("known", ())
-    effects = tuple(effect for effect in result.final.effects if effect not in known)
     tables = {"effects": effect_rows(result)}
     return Done(
-        result, "diagnosed", result.gap, result.predicts, verdict=verdict, effects=effects,
+        result, "diagnosed", result.gap_as_read, result.predicts, verdict=result.verdict.name, effects=result.found,
         has_windows=has_windows(case.building), tables=tables,
     )  # fmt: skip
 
@@ -128,7 +126,7 @@ def effect_rows(result: Diagnosis) -> list[dict[str, Any]]:
         From `diagnose`.
     """
     kept = ("effect", "probability", "score", "retained_share", "testable", "zones", "group")
-    found = set(result.final.effects)
+    found = set(result.found)
     return [
         {name: plain(getattr(c, name)) for name in kept} | {"found": c.effect in found}
         for c in result.verdict.candidates

@@ -12,6 +12,7 @@ import pytest
 
 from calibration.diagnosis.decide.verdict import chance_of, judge
 from calibration.diagnosis.diagnosis import Diagnosis, baseline_gap, diagnose
+from calibration.diagnosis.faults import Errors, Fault
 from calibration.diagnosis.free import (
     Free,
     drawing_fails,
@@ -120,6 +121,18 @@ def test_what_is_left_is_said_to_come_back_or_not() -> None:
     assert "0.20 K of what is left come back on days that were left out, most of all with sun." in diagnosis_verdict(
         shown
     )
+
+
+def test_what_is_part_of_a_structure_was_not_found_and_faults_were() -> None:
+    last = replace(diagnosed().rounds[-1], accepted=None)
+    structures = replace(last, before=replace(last.before, effects={"clock_shift": ()}))
+    found = replace(diagnosed(), rounds=(structures,), steps=())
+    assert found.found == () and "clock_shift" not in repr(found)
+    fault = cast(Fault, SimpleNamespace(effect="swapped_sensors", before=Errors(0.8, 0.6)))
+    assert replace(found, faults=(fault,)).found == ("swapped_sensors",)
+    assert (found.gap_as_read, replace(found, faults=(fault,)).gap_as_read) == (found.gap, 0.6)
+    beyond = replace(last, before=replace(last.before, effects={"solar_gain": ()}))
+    assert replace(found, rounds=(replace(last, before=replace(last.before, effects={})), beyond)).found == ("solar_gain",)
 
 
 def test_the_chance_of_a_gain_is_that_of_bayes_factors() -> None:
