@@ -30,6 +30,9 @@ ADVANCE = 0.1
 #: What a building as drawn has one value of for all zones, though rooms differ in it: slabs and furniture.
 MASSES = ("slab_heat_capacity", "slab_coupling", "furniture_heat_capacity", "furniture_coupling")
 
+#: The same of what lies between rooms and outdoor, where a drawing is no survey: areas and layers of each room differ.
+LOSSES = ("exterior_wall_conductivity_multiplier", "window_conductance_multiplier", "window_u_value")
+
 #: What coarse telemetry of a free structure may need, readings at an instant of their step beside means of it, and the
 #: share by which it must do better [-]: two parameters more; of three measured houses and the Twin Houses one has it.
 CLOCK, _MOVED = "clock_shift", 0.05

@@ -216,7 +216,7 @@ class _Walk:
             self.lasting = [k for k, e in enumerate(self.events) if e.end is None]
             cap = self.threshold / 2.0  # no single day may raise an alarm
             self.watch = Watch(self.what, state.mean.size, self.dispersion, cap, [ends[k] for k in self.lasting])
-        alarm = self.watch.take(day, self.days, innovation)
+        alarm = self.watch.take(day, self.days, innovation, self.pending)
         if self.pending is None:
             self.evidence[day] = alarm.log_evidence
             if alarm.log_evidence > self.threshold:

@@ -230,7 +230,7 @@ class Watch:
         self._grows = np.array([what.columns[i].from_zero for i in what.which], dtype=bool)
         self.log_ratio = np.zeros((0, k + len(self.ends)))
 
-    def take(self, day: int, days: Days, innovation: Innovation) -> Alarm:
+    def take(self, day: int, days: Days, innovation: Innovation, noticed: int | None = None) -> Alarm:
         """Take in a day.
 
         Parameters
@@ -241,8 +241,10 @@ class Watch:
             With the derivatives of its errors.
         innovation : Innovation
             Of the filter.
+        noticed : int, optional
+            Day of an alarm that waits for its name: starts that were sought then are kept.
         """
-        self._renew(day)
+        self._renew(day, day if noticed is None else noticed)
         n, t, k = self._moved.shape
         own = self.what.shown(days, day, innovation)
         self.dispersion.put(day, own, innovation)
@@ -276,9 +278,9 @@ class Watch:
         sharp = self._information[row, number] + self._deviation[number] ** -2.0
         return float(self._score[row, number] / sharp)
 
-    def _renew(self, day: int) -> None:
-        """Let go of starts that are too long ago, and begin a new one."""
-        age = day - self.starts
+    def _renew(self, day: int, by: int) -> None:
+        """Let go of starts that are too long ago by some day, and begin a new one."""
+        age = by - self.starts
         kept = (age < _EACH) | ((self.starts % _THIRD == 0) & (age < _LONGEST))
         self.starts = np.append(self.starts[kept], day)
         new = np.zeros((self._moved.shape[0], 1, self._moved.shape[2]))

@@ -9,6 +9,7 @@ from calibration.diagnosis.decide.verdict import Candidate, group_of
 from calibration.diagnosis.decide.where import Where
 from calibration.diagnosis.diagnosis import Diagnosis
 from calibration.diagnosis.refit.refit import WINDOWS, Refit
+from calibration.fit.ladder import LOSSES
 from mpc.reports.correction_words import correction_sentence, faults_sentence
 from mpc.reports.evaluation import beside_sentence, carried_sentence, structure_words
 from mpc.reports.free_words import comes_back, free_sentence, known_effects
@@ -45,9 +46,10 @@ def diagnosis_verdict(result: Diagnosis) -> str:
             " No irradiance is measured: how bright a day was is estimated from the range of the outdoor temperature, "
             "so that the sun's size is rough."
         )
-    if result.settings.scopes:
+    if own := result.settings.scopes:
+        what = "Outer walls and windows" if set(own) & set(LOSSES) else "Slabs and furniture"
         text += (
-            " Slabs and furniture have values of each zone's own here: they explain what looked like another effect "
+            f" {what} have values of each zone's own here: they explain what looked like another effect "
             "while all zones shared one."
         )
     if result.better is not None and not result.drawing_fails:

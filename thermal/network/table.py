@@ -178,10 +178,10 @@ def _facade(graph: GraphBuilder, surface: Surface) -> str | None:
 def _add_window(graph: GraphBuilder, zones: Mapping[str, Zone], surface: Surface) -> None:
     """Glass: rated air-to-air u-value with its films replaced by the building's own."""
     zone, rated, facade = zones[surface.zone], float(surface.u_value or 0.0), _facade(graph, surface)
-    multiplier = graph.parameter("window_conductance_multiplier", facade=facade)
+    multiplier = graph.parameter("window_conductance_multiplier", zone.name, facade=facade)
     if surface.other in zones:
-        behind = zones[surface.other].air
-        graph.face(f"window u={rated:g} between zones", rated * multiplier, zone.air, behind, surface.area)
+        key = graph.key(f"window u={rated:g} between zones", zone.name, "window_conductance_multiplier")
+        graph.face(key, rated * multiplier, zone.air, zones[surface.other].air, surface.area)
         return
     pane = multiplier / max(1.0 / rated - 1.0 / WINDOW_RATED_FILM - 1.0 / RATED_OUTSIDE_FILM, LEAST_PANE_RESISTANCE)
     side, value, outlook = "boundary", series(pane, 1.0 / BOUNDARY_FILM_RESISTANCE), None
@@ -222,7 +222,8 @@ def _parts(
     """
     group, facade = _group(surface), _facade(graph, surface)
     names = f"{group}_conductivity_multiplier", f"{group}_heat_capacity_multiplier"
-    plain = _Part(None, group, *names, *(graph.parameter(name, facade=facade) for name in names))
+    owner = surface.zone if group == "exterior_wall" else None  # what lies between rooms is of neither
+    plain = _Part(owner, group, *names, *(graph.parameter(name, owner, facade=facade) for name in names))
     place = wall.near + np.concatenate([[0.0], np.cumsum(wall.between)])
     seen: list[tuple[str, str, tuple[Layer, ...], IntArray, FloatArray]]
     seen = [(surface.zone, surface.kind, layers, nodes, place)]
@@ -286,7 +287,7 @@ def _outer_side(graph: GraphBuilder, surface: Surface, part: _Part, resistance: 
     if surface.other == "outdoor":
         place, film = "outdoor", graph.parameter("exterior_convection_coefficient", facade=facade)
     depends = (part.conductivity, "exterior_convection_coefficient")
-    key = graph.key(f"{part.name}-{place} r={2.0 * resistance:.6g}", None, *depends, facade=facade)
+    key = graph.key(f"{part.name}-{place} r={2.0 * resistance:.6g}", part.zone, *depends, facade=facade)
     value = series(film, part.scale / resistance)
     graph.face(key, value, int(node[0]), graph.boundary(surface.other), surface.area)
     if surface.other == "outdoor":

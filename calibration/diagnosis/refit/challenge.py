@@ -1,10 +1,11 @@
-"""Challenge of what a search found: slabs and furniture of each zone's own, which no instrument is to blame for.
+"""Challenge of what a search found: masses or losses of each zone's own, which no instrument is to blame for.
 
-A drawing has one value for the masses of all zones, and zones differ in them. What that leaves is taken for a meter
-that is wrong zone by zone, and gains as much as a true one.
+A drawing has one value for the slabs and furniture of all zones, and zones differ in them; one that is no survey is
+wrong in what lies between rooms and outdoor, too. What that leaves is taken for a meter that is wrong zone by zone, and
+gains as much as a true one.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +16,7 @@ from calibration.diagnosis.refit.refit import ACCEPTED, held_out
 from calibration.diagnosis.refit.search import Round, search
 from calibration.errors import CalibrationError
 from calibration.fit.fitted_case import is_large
-from calibration.fit.ladder import MASSES
+from calibration.fit.ladder import LOSSES, MASSES
 from calibration.progress import Progress
 from thermal.errors import ModelError
 from thermal.parameters import Scope
@@ -30,11 +31,11 @@ _MASS = "hidden_mass"
 def challenge(
     models: ModelComparison, rounds: Sequence[Round], candidates: Sequence[str], progress: Progress | None = None
 ) -> tuple[ModelComparison, tuple[Round, ...]]:
-    """Search anew about a building with masses by zone, where these are better evidence than what was found.
+    """Search anew about a building with masses or losses by zone, where these are better evidence than what was found.
 
     They are weighed against what was found, alone and beside as much of it as does not act as masses do: what zones
     differ in takes further effects to imitate, and hides what is missing. Where something is left that no effect
-    explains, they are weighed against nothing.
+    explains, they are weighed against nothing. Losses by zone have a say where the drawing is no survey.
 
     Parameters
     ----------
@@ -54,27 +55,37 @@ def challenge(
     """
     final = rounds[-1].after
     name = judge(rounds, {}).name
-    zones, parameters = models.case.building.zone_names, rounds[0].before.built.network.parameters
-    scopes: dict[str, Scope] = {p.base: "zone" for p in parameters if p.base in MASSES}
-    if len(zones) < 2 or is_large(zones) or not scopes or name == "no_gap" or _MASS in final.effects:
+    zones = models.case.building.zone_names
+    zoned = list(_by_zone(models, {p.base for p in rounds[0].before.built.network.parameters}))
+    if len(zones) < 2 or is_large(zones) or not zoned or name == "no_gap" or _MASS in final.effects:
         return models, tuple(rounds)
-    settings = replace(models.settings, scopes={**models.settings.scopes, **scopes})
-    zoned = replace(models, settings=settings, tune=models.tuned, hold_out=models.judged)
-    zoned.drivers.openings = models.drivers.openings
     known = dict(rounds[0].before.effects)
     try:
         for effects, least in _rivals(rounds, known):
-            other = zoned.fit(effects, [_values(final, effects)])
+            fits = [(own, own.fit(effects, [_values(final, effects)])) for own in zoned]
+            own, other = max(fits, key=lambda found: found[1].evidence)
             if other.evidence >= least:
-                baseline = other if effects == known else zoned.fit(known, [_values(final, known)])
-                return zoned, search(zoned, baseline, held_out(zoned, baseline), candidates, progress)
+                baseline = other if effects == known else own.fit(known, [_values(final, known)])
+                return own, search(own, baseline, held_out(own, baseline), candidates, progress)
     except (ArithmeticError, np.linalg.LinAlgError, CalibrationError, ModelError):
         pass
     return models, tuple(rounds)
 
 
+def _by_zone(models: ModelComparison, drawn: Collection[str]) -> Iterator[ModelComparison]:
+    """Give each zone a value of its own of what a drawing has one of."""
+    surveyed = models.case.building.geometry_quality == "surveyed"
+    for names in (MASSES,) if surveyed else (MASSES, LOSSES):
+        scopes: dict[str, Scope] = {name: "zone" for name in names if name in drawn}
+        if scopes:
+            settings = replace(models.settings, scopes={**models.settings.scopes, **scopes})
+            own = replace(models, settings=settings, tune=models.tuned, hold_out=models.judged)
+            own.drivers.openings = models.drivers.openings
+            yield own
+
+
 def _rivals(rounds: Sequence[Round], known: Effects) -> Iterator[tuple[Effects, float]]:
-    """Parts of what was found, from nothing on, and the evidence that masses by zone must have beside each.
+    """Parts of what was found, from nothing on, and the evidence that a building by zone must have beside each.
 
     A name has to beat what needs none as clearly as it beat nothing; masses that need as many have to beat these so.
     """
