@@ -46,8 +46,8 @@ def diagnosis_verdict(result: Diagnosis) -> str:
             " No irradiance is measured: how bright a day was is estimated from the range of the outdoor temperature, "
             "so that the sun's size is rough."
         )
-    if own := result.settings.scopes:
-        what = "Outer walls and windows" if set(own) & set(LOSSES) else "Slabs and furniture"
+    if scopes := result.settings.scopes:
+        what = "Outer walls and windows" if set(scopes) & set(LOSSES) else "Slabs and furniture"
         text += (
             f" {what} have values of each zone's own here: they explain what looked like another effect "
             "while all zones shared one."

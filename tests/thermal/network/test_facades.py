@@ -213,6 +213,34 @@ def test_value_of_a_direction_acts_on_its_surfaces_alone(member: str) -> None:
     assert set(network.zone[others]) == {room}
 
 
+def test_value_of_a_zone_is_another_construction_of_its_outer_walls() -> None:
+    house, name = table_building(), "exterior_wall_conductivity_multiplier"
+    table = house.geometry
+    assert isinstance(table, ZoneTable)
+    better = tuple(layer.model_copy(update={"conductivity": 1.7 * layer.conductivity}) for layer in LAYERS)
+    own = {"W1", "W2", "W3"}
+    surfaces = tuple(
+        s.model_copy(update={"construction": "other"}) if s.name in own else s for s in table.surfaces
+    )  # fmt: skip
+    drawn = Building("drawn", SITE, 0.0, ZoneTable(table.zones, surfaces, {**table.constructions, "other": better}))
+    nodes = Structure(wall_nodes=2)  # as many through either construction
+    wanted = matrices(build_network(drawn, structure=nodes))
+    found = matrices(build_network(house, scopes={name: "zone"}, structure=nodes), **{f"{name}@R": 1.7})
+    for one, other in zip(found, wanted, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-9)
+
+
+def test_windows_of_a_zone_have_a_value_of_their_own() -> None:
+    house, name = table_building(), "window_conductance_multiplier"
+    network = build_network(house, scopes={name: "zone"})
+    before, _ = matrices(network)
+    np.testing.assert_allclose(before, matrices(build_network(house))[0], rtol=1e-12, atol=1e-9)
+    after, _ = matrices(network, **{f"{name}@R": 1.7})
+    moved = np.flatnonzero(np.abs(after - before).any(axis=1))
+    assert moved.size and set(network.zone[moved]) == {network.zones.index("R")}
+    assert [p.name for p in network.parameters if p.base == name] == [f"{name}@R"]  # the hall has none
+
+
 @pytest.mark.parametrize(
     ("azimuth", "wanted"),
     [(0.0, "north"), (44.9, "north"), (45.0, "east"), (134.9, "east"), (135.0, "south"), (180.0, "south"),

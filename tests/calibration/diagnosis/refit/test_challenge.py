@@ -1,5 +1,6 @@
-"""Masses by zone against meters that are wrong by zone: twins of either kind, and what a search is told."""
+"""Masses and losses by zone against meters that are wrong by zone: twins of either kind, and what a search is told."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,19 +12,21 @@ from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.diagnosis.screen.gains import choice_of
 from calibration.evaluation.settings import ModelSettings
 from calibration.fit.ladder import MASSES
+from thermal.case.building import GeometryQuality
 from thermal.case.case import Case
 from thermal.case.telemetry import Telemetry
 from thermal.pilot.building import pilot_building
 from thermal.pilot.twin import TwinRanges, TwinSettings, generate_twin
 
 
-def office(by_zone: bool) -> Case:
-    """A twin under pseudo-random setpoints, with masses of each zone's own or without."""
-    building = pilot_building(4, floor_area=150.0, zones=5, floors=1, name="office")
+def office(*by_zone: str, quality: GeometryQuality = "approximate") -> Case:
+    """A twin under pseudo-random setpoints, some of whose parameters are each zone's own."""
+    drawn = pilot_building(4, floor_area=150.0, zones=5, floors=1, name="office")
+    building = replace(drawn, geometry_quality=quality)
     quiet = TwinRanges(disturbance_deviation=(0.01, 0.02), noise=(0.005, 0.01))
     settings = TwinSettings(
         days=12.0, step_seconds=900.0, dx=1.0, meter="exact", ranges=quiet, excitation="prbs",
-        scopes=dict.fromkeys(MASSES, "zone") if by_zone else None,
+        scopes=dict.fromkeys(by_zone, "zone"),
     )  # fmt: skip
     return generate_twin(building, 4, settings)[0]
 
@@ -62,7 +65,7 @@ def told(monkeypatch: pytest.MonkeyPatch) -> list[tuple[ModelComparison, Fit]]:
 
 
 def test_masses_by_zone_take_the_name_from_meters(told: list[tuple[ModelComparison, Fit]]) -> None:
-    models = ModelComparison(office(by_zone=True), ModelSettings(dx=1.0))
+    models = ModelComparison(office(*MASSES), ModelSettings(dx=1.0))
     rounds = accepted(models)
     again, found = challenge(models, rounds, ["flow_gain"])
     assert found == ("another",)
@@ -72,8 +75,18 @@ def test_masses_by_zone_take_the_name_from_meters(told: list[tuple[ModelComparis
     assert not baseline.effects and baseline.evidence > rounds[0].after.evidence - 12.0
 
 
+@pytest.mark.parametrize("quality", ["approximate", "surveyed"])
+def test_losses_by_zone_take_it_where_the_drawing_is_no_survey(
+    told: list[tuple[ModelComparison, Fit]], quality: GeometryQuality
+) -> None:
+    models = ModelComparison(office("window_u_value", quality=quality), ModelSettings(dx=1.0))
+    again, _ = challenge(models, accepted(models), ["flow_gain"])
+    assert len(told) == 1
+    assert set(again.settings.scopes) == ({"window_u_value"} if quality == "approximate" else set(MASSES))
+
+
 def test_meters_that_are_wrong_keep_it(told: list[tuple[ModelComparison, Fit]]) -> None:
-    models = ModelComparison(wrong_meters(office(by_zone=False)), ModelSettings(dx=1.0))
+    models = ModelComparison(wrong_meters(office()), ModelSettings(dx=1.0))
     rounds = accepted(models)
     assert rounds[0].after.evidence > rounds[0].before.evidence + 12.0
     assert challenge(models, rounds, ["flow_gain"]) == (models, tuple(rounds))
@@ -83,7 +96,7 @@ def test_meters_that_are_wrong_keep_it(told: list[tuple[ModelComparison, Fit]]) 
 def test_where_nothing_is_missing_or_masses_are_what_is_nothing_is_challenged(
     told: list[tuple[ModelComparison, Fit]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    models = ModelComparison(office(by_zone=True), ModelSettings(dx=1.0))
+    models = ModelComparison(office(*MASSES), ModelSettings(dx=1.0))
     rounds = accepted(models)
     masses = SimpleNamespace(**vars(rounds[0]) | {"after": SimpleNamespace(effects={"hidden_mass": ()})})
     assert challenge(models, [masses], [])[1] == (masses,)
