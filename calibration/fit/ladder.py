@@ -15,6 +15,7 @@ from calibration.fit.problem import tuning_problem
 from calibration.fit.result import CalibrationResult, Rung
 from calibration.progress import Forward, Progress
 from calibration.stages import stage
+from thermal.case.building import Building
 from thermal.case.case import Case
 from thermal.case.emitters import Unknown, unknown_heaters
 from thermal.inputs.provider import telemetry_inputs
@@ -133,6 +134,17 @@ def fit_emitter(
     return looked[_best(looked, ADVANCE)].fit
 
 
+def by_zone(building: Building) -> tuple[str, ...]:
+    """Name what a drawing has one value of for all zones though they may differ in it.
+
+    Parameters
+    ----------
+    building : Building
+        Any.
+    """
+    return MASSES if building.geometry_quality == "surveyed" else (*MASSES, *LOSSES)
+
+
 class Tuned(Protocol):
     """A case with the days that tune, those that judge, and the settings of a fit."""
 
@@ -216,7 +228,7 @@ def climb_from(
         if (seen := ladder.look("wind", wind)).left.mae < looked[best].left.mae:
             looked.append(seen)
             begun["wind"], base, fitted = (follows, fitted), follows, wind
-    scopes: dict[str, Scope] = {p.base: "zone" for p in parameters if p.base in MASSES}
+    scopes: dict[str, Scope] = {p.base: "zone" for p in parameters if p.base in by_zone(given.case.building)}
     if scopes and plain and drawn and not base.scopes and len(fitted.model.network.zones) > 1:
         looked.append(ladder.fitted("zoned", replace(base, scopes={**base.scopes, **scopes}), fitted))
     looked += people + free
