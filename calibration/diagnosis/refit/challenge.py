@@ -66,7 +66,9 @@ def challenge(
             own, other = max(fits, key=lambda found: found[1].evidence)
             if other.evidence >= least:
                 baseline = other if effects == known else own.fit(known, [_values(final, known)])
-                return own, search(own, baseline, held_out(own, baseline), candidates, progress)
+                again = search(own, baseline, held_out(own, baseline), candidates, progress)
+                # of several effects a search may find the first alone, and what it stops at is no better then
+                return (own, again) if again[-1].after.evidence >= least else (models, tuple(rounds))
     except (ArithmeticError, np.linalg.LinAlgError, CalibrationError, ModelError):
         pass
     return models, tuple(rounds)

@@ -55,9 +55,9 @@ def told(monkeypatch: pytest.MonkeyPatch) -> list[tuple[ModelComparison, Fit]]:
     """What another search is told to start from; a search is not what is looked at here."""
     found: list[tuple[ModelComparison, Fit]] = []
 
-    def search(models: ModelComparison, baseline: Fit, *_: Any) -> tuple[str, ...]:
+    def search(models: ModelComparison, baseline: Fit, *_: Any) -> tuple[SimpleNamespace, ...]:
         found.append((models, baseline))
-        return ("another",)
+        return (SimpleNamespace(after=baseline),)
 
     monkeypatch.setattr(module, "search", search)
     monkeypatch.setattr(module, "judge", lambda *_: SimpleNamespace(name="named"))
@@ -68,8 +68,8 @@ def test_masses_by_zone_take_the_name_from_meters(told: list[tuple[ModelComparis
     models = ModelComparison(office(*MASSES), ModelSettings(dx=1.0))
     rounds = accepted(models)
     again, found = challenge(models, rounds, ["flow_gain"])
-    assert found == ("another",)
     ((zoned, baseline),) = told
+    assert found == (SimpleNamespace(after=baseline),)
     assert again is zoned and set(zoned.settings.scopes) == set(MASSES)
     assert (zoned.tuned, zoned.judged) == (models.tuned, models.judged)
     assert not baseline.effects and baseline.evidence > rounds[0].after.evidence - 12.0
@@ -83,6 +83,16 @@ def test_losses_by_zone_take_it_where_the_drawing_is_no_survey(
     again, _ = challenge(models, accepted(models), ["flow_gain"])
     assert len(told) == 1
     assert set(again.settings.scopes) == ({"window_u_value"} if quality == "approximate" else set(MASSES))
+
+
+def test_a_search_that_stops_short_of_what_was_found_is_not_taken(
+    told: list[tuple[ModelComparison, Fit]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    models = ModelComparison(office(*MASSES), ModelSettings(dx=1.0))
+    rounds = accepted(models)
+    short = SimpleNamespace(after=SimpleNamespace(evidence=rounds[0].after.evidence - 100.0))
+    monkeypatch.setattr(module, "search", lambda *_: (short,))
+    assert challenge(models, rounds, ["flow_gain"]) == (models, tuple(rounds))
 
 
 def test_meters_that_are_wrong_keep_it(told: list[tuple[ModelComparison, Fit]]) -> None:
