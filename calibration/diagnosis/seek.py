@@ -210,7 +210,7 @@ def _seek(drawn: ModelComparison, known: Sequence[str], ruled_out: Sequence[str]
     testable = [e for e in CATALOGUE if e not in untestable]
     rounds = search(models, baseline, errors, testable, whole.part(0.5))
     models, rounds = stage(
-        "masses by zone", lambda: challenge(models, rounds, testable, whole.part(0.3, "masses by zone"))
+        "values by zone", lambda: challenge(models, rounds, testable, whole.part(0.3, "values by zone"))
     )
     about = _About(models, rounds, untestable)
     if judge(rounds, untestable).name != "no_gap":

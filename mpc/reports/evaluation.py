@@ -130,7 +130,7 @@ _STRUCTURES = {
     "radiator": "as drawn, with heat that radiates in part",
     "floor": "as drawn, with heat that floors give",
     "wind": "as drawn, with outside films that follow the wind",
-    "zoned": "as drawn, with slabs and furniture of each zone's own",
+    "zoned": "as drawn, with values of each zone's own",
     "people": "as drawn with people who have hours of their own in each zone",
     "people beside": "as drawn with what was found and people who have hours of their own in each zone",
     "lumped": "lumped into air and mass a zone",
