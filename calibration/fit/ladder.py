@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Protocol
 
 from calibration.evaluation.intervals import Interval, days_of
@@ -134,15 +135,15 @@ def fit_emitter(
     return looked[_best(looked, ADVANCE)].fit
 
 
-def by_zone(building: Building) -> tuple[str, ...]:
-    """Name what a drawing has one value of for all zones though they may differ in it.
+def by_zone(building: Building) -> tuple[tuple[str, ...], ...]:
+    """Name what a drawing has one value of for all zones though they may differ in it: masses, and losses of a guess.
 
     Parameters
     ----------
     building : Building
         Any.
     """
-    return MASSES if building.geometry_quality == "surveyed" else (*MASSES, *LOSSES)
+    return (MASSES,) if building.geometry_quality == "surveyed" else (MASSES, LOSSES)
 
 
 class Tuned(Protocol):
@@ -177,7 +178,8 @@ def climb_from(
     """Fit further structures beside a fitted model; the simplest is kept that predicts left-out days about best.
 
     With heat that radiates, or that floors give, where the case does not say what heaters give it by; with outside
-    films that follow the wind, and with slabs and furniture by zone, unless a lumped model halves the drawing's error;
+    films that follow the wind, and with slabs and furniture by zone (outer walls and windows too, where the drawing is
+    no survey), unless a lumped model halves the drawing's error;
     lumped, where the sun is a part of it, by an estimate if irradiance is not measured; lumped, with a gain that recurs
     from day to day, which is linear, so that a few Newton steps from the lumped estimate tell whether it is worth a
     fit; as drawn with the heat of people who have hours of their own in each zone, looked at in the same way;
@@ -228,7 +230,8 @@ def climb_from(
         if (seen := ladder.look("wind", wind)).left.mae < looked[best].left.mae:
             looked.append(seen)
             begun["wind"], base, fitted = (follows, fitted), follows, wind
-    scopes: dict[str, Scope] = {p.base: "zone" for p in parameters if p.base in by_zone(given.case.building)}
+    differing = set(chain(*by_zone(given.case.building)))
+    scopes: dict[str, Scope] = {p.base: "zone" for p in parameters if p.base in differing}
     if scopes and plain and drawn and not base.scopes and len(fitted.model.network.zones) > 1:
         looked.append(ladder.fitted("zoned", replace(base, scopes={**base.scopes, **scopes}), fitted))
     looked += people + free

@@ -16,7 +16,7 @@ from calibration.diagnosis.refit.refit import ACCEPTED, held_out
 from calibration.diagnosis.refit.search import Round, search
 from calibration.errors import CalibrationError
 from calibration.fit.fitted_case import is_large
-from calibration.fit.ladder import LOSSES, MASSES
+from calibration.fit.ladder import by_zone
 from calibration.progress import Progress
 from thermal.errors import ModelError
 from thermal.parameters import Scope
@@ -56,7 +56,7 @@ def challenge(
     final = rounds[-1].after
     name = judge(rounds, {}).name
     zones = models.case.building.zone_names
-    zoned = list(_by_zone(models, {p.base for p in rounds[0].before.built.network.parameters}))
+    zoned = list(_zoned(models, {p.base for p in rounds[0].before.built.network.parameters}))
     if len(zones) < 2 or is_large(zones) or not zoned or name == "no_gap" or _MASS in final.effects:
         return models, tuple(rounds)
     known = dict(rounds[0].before.effects)
@@ -74,10 +74,9 @@ def challenge(
     return models, tuple(rounds)
 
 
-def _by_zone(models: ModelComparison, drawn: Collection[str]) -> Iterator[ModelComparison]:
+def _zoned(models: ModelComparison, drawn: Collection[str]) -> Iterator[ModelComparison]:
     """Give each zone a value of its own of what a drawing has one of."""
-    surveyed = models.case.building.geometry_quality == "surveyed"
-    for names in (MASSES,) if surveyed else (MASSES, LOSSES):
+    for names in by_zone(models.case.building):
         scopes: dict[str, Scope] = {name: "zone" for name in names if name in drawn}
         if scopes:
             settings = replace(models.settings, scopes={**models.settings.scopes, **scopes})
