@@ -53,7 +53,7 @@ def measure(path: Path, diagnosed: bool) -> dict[str, Any]:
     }
     if diagnosed:
         found = diagnose(case)
-        row |= {"verdict": found.verdict.name, "diagnosed": found.predicts, "effects": list(found.final.effects)}
+        row |= {"verdict": found.verdict.name, "diagnosed": found.predicts, "effects": list(found.found)}
     return row
 
 

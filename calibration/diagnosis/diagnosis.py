@@ -273,8 +273,9 @@ class Diagnosis(Result):
         return rows.set_index("effect").drop(columns="parameters")
 
     def _summary(self) -> str:
-        found = f", with {' + '.join(self.found)} {self.steps[-1].after:.3f} K" if self.steps else ""
-        return f"{self.case}, {self.verdict.name}; held-out error {self.gap:.3f} K{found}"
+        after = self.steps[-1].after if self.steps else self.gap
+        found = f", with {' + '.join(self.found)} {after:.3f} K" if self.found else ""
+        return f"{self.case}, {self.verdict.name}; held-out error {self.gap_as_read:.3f} K{found}"
 
     def _draw(self, axes: Axes) -> None:
         shown = self.to_frame().query("testable")["probability"][::-1]

@@ -16,7 +16,7 @@ from calibration.fit.problem import tuning_problem
 from calibration.fit.result import CalibrationResult, Rung
 from calibration.progress import Forward, Progress
 from calibration.stages import stage
-from thermal.case.building import Building
+from thermal.case.building import Building, ZoneTable
 from thermal.case.case import Case
 from thermal.case.emitters import Unknown, unknown_heaters
 from thermal.inputs.provider import telemetry_inputs
@@ -143,7 +143,12 @@ def by_zone(building: Building) -> tuple[tuple[str, ...], ...]:
     building : Building
         Any.
     """
-    return (MASSES,) if building.geometry_quality == "surveyed" else (MASSES, LOSSES)
+    if building.geometry_quality == "surveyed":
+        return (MASSES,)
+    table, zones = building.geometry, building.zone_names
+    if isinstance(table, ZoneTable) and all(s.other in zones for s in table.surfaces if s.kind == "window"):
+        return MASSES, tuple(name for name in LOSSES if not name.startswith("window"))  # between rooms, of neither
+    return MASSES, LOSSES
 
 
 class Tuned(Protocol):

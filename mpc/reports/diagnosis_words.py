@@ -9,7 +9,6 @@ from calibration.diagnosis.decide.verdict import Candidate, group_of
 from calibration.diagnosis.decide.where import Where
 from calibration.diagnosis.diagnosis import Diagnosis
 from calibration.diagnosis.refit.refit import WINDOWS, Refit
-from calibration.fit.ladder import LOSSES
 from mpc.reports.correction_words import correction_sentence, faults_sentence
 from mpc.reports.evaluation import beside_sentence, carried_sentence, structure_words
 from mpc.reports.free_words import comes_back, free_sentence, known_effects
@@ -19,6 +18,9 @@ from thermal.inputs.provider import IRRADIANCE
 
 #: What an effect is called where its title would read oddly after "leaves out".
 _CALLED = {"hidden_mass": "mass that stores heat"}
+
+#: What parameters that zones have of their own belong to, by the beginnings of their names.
+_OWN = {"slab": "slabs", "furniture": "furniture", "exterior_wall": "outer walls", "window": "windows"}
 
 #: Probability from which an effect is said to be left out, rather than perhaps [-].
 _LIKELY = 0.5
@@ -46,11 +48,11 @@ def diagnosis_verdict(result: Diagnosis) -> str:
             " No irradiance is measured: how bright a day was is estimated from the range of the outdoor temperature, "
             "so that the sun's size is rough."
         )
-    if scopes := result.settings.scopes:
-        what = "Outer walls and windows" if set(scopes) & set(LOSSES) else "Slabs and furniture"
+    if zoned := [name for name, scope in result.settings.scopes.items() if scope == "zone"]:
+        what = [words for part, words in _OWN.items() if any(name.startswith(part) for name in zoned)]
         text += (
-            f" {what} have values of each zone's own here: they explain what looked like another effect "
-            "while all zones shared one."
+            f" {listed(what or zoned).capitalize()} have values of each zone's own here: they explain what looked like "
+            "another effect while all zones shared one."
         )
     if result.better is not None and not result.drawing_fails:
         own, beside = next(r.left_out_mae for r in result.rungs if r.chosen), result.rungs[0].left_out_mae

@@ -178,10 +178,11 @@ def _facade(graph: GraphBuilder, surface: Surface) -> str | None:
 def _add_window(graph: GraphBuilder, zones: Mapping[str, Zone], surface: Surface) -> None:
     """Glass: rated air-to-air u-value with its films replaced by the building's own."""
     zone, rated, facade = zones[surface.zone], float(surface.u_value or 0.0), _facade(graph, surface)
-    multiplier = graph.parameter("window_conductance_multiplier", zone.name, facade=facade)
-    if surface.other in zones:
-        key = graph.key(f"window u={rated:g} between zones", zone.name, "window_conductance_multiplier")
-        graph.face(key, rated * multiplier, zone.air, zones[surface.other].air, surface.area)
+    inner = surface.other in zones  # of neither
+    multiplier = graph.parameter("window_conductance_multiplier", None if inner else zone.name, facade=facade)
+    if inner:
+        behind = zones[surface.other].air
+        graph.face(f"window u={rated:g} between zones", rated * multiplier, zone.air, behind, surface.area)
         return
     pane = multiplier / max(1.0 / rated - 1.0 / WINDOW_RATED_FILM - 1.0 / RATED_OUTSIDE_FILM, LEAST_PANE_RESISTANCE)
     side, value, outlook = "boundary", series(pane, 1.0 / BOUNDARY_FILM_RESISTANCE), None

@@ -53,36 +53,46 @@ def challenge(
     tuple
         What was searched in the end, and its rounds.
     """
-    final = rounds[-1].after
-    name = judge(rounds, {}).name
-    zones = models.case.building.zone_names
-    zoned = list(_zoned(models, {p.base for p in rounds[0].before.built.network.parameters}))
-    if len(zones) < 2 or is_large(zones) or not zoned or name == "no_gap" or _MASS in final.effects:
+    final, zones = rounds[-1].after, models.case.building.zone_names
+    told = judge(rounds, {}).name != "no_gap" and _MASS not in final.effects
+    if len(zones) < 2 or is_large(zones) or not told:
         return models, tuple(rounds)
     known = dict(rounds[0].before.effects)
-    try:
-        for effects, least in _rivals(rounds, known):
-            fits = [(own, own.fit(effects, [_values(final, effects)])) for own in zoned]
-            own, other = max(fits, key=lambda found: found[1].evidence)
-            if other.evidence >= least:
-                baseline = other if effects == known else own.fit(known, [_values(final, known)])
-                again = search(own, baseline, held_out(own, baseline), candidates, progress)
-                # of several effects a search may find the first alone, and what it stops at is no better then
-                return (own, again) if again[-1].after.evidence >= least else (models, tuple(rounds))
-    except (ArithmeticError, np.linalg.LinAlgError, CalibrationError, ModelError):
-        pass
+    zoned = list(_zoned(models, {p.base for p in rounds[0].before.built.network.parameters}))
+    for effects, least in _rivals(rounds, known):
+        fits = [(own, _fit(own, effects, final)) for own in zoned]
+        better = [(own, fit) for own, fit in fits if fit is not None and fit.evidence >= least]
+        for own, other in sorted(better, key=lambda found: -found[1].evidence):
+            baseline = other if effects == known else _fit(own, known, final)
+            if baseline is None:
+                continue
+            again = search(own, baseline, held_out(own, baseline), candidates, progress)
+            # of several effects a search may find the first alone, and what it stops at is no better then
+            if again[-1].after.evidence >= least:
+                return own, again
+        if better:
+            break
     return models, tuple(rounds)
+
+
+def _fit(models: ModelComparison, effects: Effects, final: Fit) -> Fit | None:
+    """Fit effects from where they were found; None where that fails."""
+    try:
+        return models.fit(effects, [_values(final, effects)])
+    except (ArithmeticError, np.linalg.LinAlgError, CalibrationError, ModelError):
+        return None
 
 
 def _zoned(models: ModelComparison, drawn: Collection[str]) -> Iterator[ModelComparison]:
     """Give each zone a value of its own of what a drawing has one of."""
+    own = models.settings.scopes
     for names in by_zone(models.case.building):
-        scopes: dict[str, Scope] = {name: "zone" for name in names if name in drawn}
+        scopes: dict[str, Scope] = {name: "zone" for name in names if name in drawn and name not in own}
         if scopes:
-            settings = replace(models.settings, scopes={**models.settings.scopes, **scopes})
-            own = replace(models, settings=settings, tune=models.tuned, hold_out=models.judged)
-            own.drivers.openings = models.drivers.openings
-            yield own
+            settings = replace(models.settings, scopes={**own, **scopes})
+            zoned = replace(models, settings=settings, tune=models.tuned, hold_out=models.judged)
+            zoned.drivers.openings = models.drivers.openings
+            yield zoned
 
 
 def _rivals(rounds: Sequence[Round], known: Effects) -> Iterator[tuple[Effects, float]]:

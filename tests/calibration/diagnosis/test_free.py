@@ -126,9 +126,11 @@ def test_what_is_left_is_said_to_come_back_or_not() -> None:
 def test_what_is_part_of_a_structure_was_not_found_and_faults_were() -> None:
     last = replace(diagnosed().rounds[-1], accepted=None)
     structures = replace(last, before=replace(last.before, effects={"clock_shift": ()}))
-    found = replace(diagnosed(), rounds=(structures,), steps=())
-    assert found.found == () and "clock_shift" not in repr(found)
+    steps = (replace(diagnosed().steps[-1], after=0.25),)
+    found = replace(diagnosed(), rounds=(structures,), steps=steps)
+    assert found.found == () and "with" not in repr(found)
     fault = cast(Fault, SimpleNamespace(effect="swapped_sensors", before=Errors(0.8, 0.6)))
+    assert "error 0.600 K, with swapped_sensors 0.250 K" in repr(replace(found, faults=(fault,)))
     assert replace(found, faults=(fault,)).found == ("swapped_sensors",)
     assert (found.gap_as_read, replace(found, faults=(fault,)).gap_as_read) == (found.gap, 0.6)
     beyond = replace(last, before=replace(last.before, effects={"solar_gain": ()}))

@@ -13,8 +13,10 @@ from calibration.evaluation.intervals import default_intervals
 from calibration.fit import ladder
 from calibration.fit.calibrate import calibrate
 from calibration.fit.fitted_case import FittedCase, fit_case
+from calibration.fit.ladder import LOSSES, MASSES, by_zone
 from calibration.fit.result import CalibrationResult
 from mpc.reports.calibration import calibration_verdict
+from thermal.case.building import Building, Surface, ZoneEntry, ZoneTable
 from thermal.case.case import Case
 from thermal.case.load import load_case
 
@@ -53,6 +55,15 @@ def test_what_predicts_left_out_days_better_is_kept(climbed: CalibrationResult) 
     assert shifted.left_out_mae > 0.95 * lumped.left_out_mae
     plain = climbed.to_dict()
     assert [rung["name"] for rung in plain["rungs"]] == [rung.name for rung in climbed.rungs]
+
+
+def test_losses_differ_by_zone_where_a_drawing_is_no_survey(case: Case) -> None:
+    surveyed, guessed = (replace(case.building, geometry_quality=q) for q in ("surveyed", "approximate"))
+    assert by_zone(surveyed) == (MASSES,) and by_zone(guessed) == (MASSES, LOSSES)
+    inner = Surface(name="G", kind="window", zone="A", other="B", area=1.0, u_value=1.0, solar_transmittance=0.5)
+    rooms = tuple(ZoneEntry(name=name, volume=50.0, floor_area=20.0) for name in "AB")
+    house = Building("house", guessed.location, 0.0, ZoneTable(rooms, (inner,), {}))
+    assert by_zone(house) == (MASSES, ("exterior_wall_conductivity_multiplier",))
 
 
 @pytest.mark.long

@@ -109,6 +109,24 @@ def test_information_of_a_new_change_is_that_of_least_squares() -> None:
     assert watch._score[-1] == pytest.approx(expected.T @ innovation.left)
 
 
+def test_starts_stay_while_an_alarm_waits_for_its_name() -> None:
+    """A change three weeks before its alarm would otherwise be forgotten before it is named."""
+    days = made(0, 40)
+    noise, what = noise_of(days, 10), sought(days)
+    kept = {}
+    for waits in (False, True):
+        tracked = DayFilter(days, noise)
+        state = tracked.start()
+        watch = Watch(what, state.mean.size, Dispersion(40, what.which.size))
+        for day in range(30):
+            state, innovation = tracked.step(tracked.grown(state), day)
+            assert innovation is not None
+            watch.take(day, days, innovation, 23 if waits and day > 23 else None)
+        kept[waits] = set(watch.starts.tolist())
+    assert 3 in kept[True] and min(kept[False]) > 8
+    assert kept[False] < kept[True]
+
+
 def test_delay_is_near_lordens_bound() -> None:
     """No detector of mean run length A is sooner than log A / I on average, I the divergence a day (Lorden 1971)."""
     threshold, shift = 14.0, 1.2

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -230,15 +231,21 @@ def test_value_of_a_zone_is_another_construction_of_its_outer_walls() -> None:
         np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-9)
 
 
-def test_windows_of_a_zone_have_a_value_of_their_own() -> None:
-    house, name = table_building(), "window_conductance_multiplier"
+@pytest.mark.parametrize("name", [n for n in ENVELOPE_OF_A_TABLE if n.endswith("multiplier")])
+def test_values_of_zones_act_on_these_alone(name: str) -> None:
+    """Both zones have a wall and a window of one make, and a window between them, which is of neither."""
+    bare = table_building()
+    table = bare.geometry
+    assert isinstance(table, ZoneTable)
+    glass = (surface("G5", "window", 95.0, "hall"), surface("G6", "window", None, "R", "hall"))
+    house = replace(bare, geometry=ZoneTable(table.zones, (*table.surfaces, *glass), table.constructions))
     network = build_network(house, scopes={name: "zone"})
-    before, _ = matrices(network)
-    np.testing.assert_allclose(before, matrices(build_network(house))[0], rtol=1e-12, atol=1e-9)
-    after, _ = matrices(network, **{f"{name}@R": 1.7})
-    moved = np.flatnonzero(np.abs(after - before).any(axis=1))
-    assert moved.size and set(network.zone[moved]) == {network.zones.index("R")}
-    assert [p.name for p in network.parameters if p.base == name] == [f"{name}@R"]  # the hall has none
+    assert {p.name for p in network.parameters if p.base == name} - {name} == {f"{name}@R", f"{name}@hall"}
+    before, after = matrices(network), matrices(network, **{f"{name}@R": 1.7})
+    for one, other in zip(before, matrices(build_network(house)), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-9)
+    moved = np.abs(after[0] - before[0]).any(axis=1) | (after[1] != before[1])
+    assert moved.any() and set(network.zone[moved]) == {network.zones.index("R")}
 
 
 @pytest.mark.parametrize(
