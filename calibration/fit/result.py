@@ -94,8 +94,8 @@ class Rung(Plain):
         ``people beside`` with them and what was found; ``lumped``; ``recurring``, ``lumped floor`` and ``shifted``,
         which are lumped with a gain that recurs from day to day, with floors that are heated, or with heat and weather
         moved in time. Those as drawn have the heat of ``radiator`` or ``floor`` too where that was kept. ``lumped`` has
-        it in the air, but for what settings or case say; ``recurring`` and ``shifted`` have what the lumped one has that they
-        stand on. ``found`` is a free structure with what was found in the place of what it has itself.
+        it in the air, but for what settings or case say; ``recurring`` and ``shifted`` have what the lumped one has
+        that they stand on. ``found`` is a free structure with what was found in the place of what it has itself.
     left_out_mae : float
         Mean absolute error on tuning days that a fit has not seen [K]; NaN where there are too few days.
     parameters : int
