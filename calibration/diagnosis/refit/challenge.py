@@ -6,6 +6,7 @@ gains as much as a true one.
 """
 
 from collections.abc import Collection, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -26,6 +27,9 @@ _LIKE_MASSES = frozenset({"flow_gain", "duct_loss", "capacity_limit"})
 
 #: What says itself that masses are not as drawn.
 _MASS = "hidden_mass"
+
+#: What a fit or a search may end in; what was found stands then.
+_FAILURES = (ArithmeticError, np.linalg.LinAlgError, CalibrationError, ModelError)
 
 
 def challenge(
@@ -63,13 +67,12 @@ def challenge(
         fits = [(own, _fit(own, effects, final)) for own in zoned]
         better = [(own, fit) for own, fit in fits if fit is not None and fit.evidence >= least]
         for own, other in sorted(better, key=lambda found: -found[1].evidence):
-            baseline = other if effects == known else _fit(own, known, final)
-            if baseline is None:
-                continue
-            again = search(own, baseline, held_out(own, baseline), candidates, progress)
-            # of several effects a search may find the first alone, and what it stops at is no better then
-            if again[-1].after.evidence >= least:
-                return own, again
+            with suppress(*_FAILURES):
+                baseline = other if effects == known else own.fit(known, [_values(final, known)])
+                again = search(own, baseline, held_out(own, baseline), candidates, progress)
+                # of several effects a search may find the first alone, and what it stops at is no better then
+                if again[-1].after.evidence >= least:
+                    return own, again
         if better:
             break
     return models, tuple(rounds)
@@ -79,7 +82,7 @@ def _fit(models: ModelComparison, effects: Effects, final: Fit) -> Fit | None:
     """Fit effects from where they were found; None where that fails."""
     try:
         return models.fit(effects, [_values(final, effects)])
-    except (ArithmeticError, np.linalg.LinAlgError, CalibrationError, ModelError):
+    except _FAILURES:
         return None
 
 

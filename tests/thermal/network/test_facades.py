@@ -220,9 +220,7 @@ def test_value_of_a_zone_is_another_construction_of_its_outer_walls() -> None:
     assert isinstance(table, ZoneTable)
     better = tuple(layer.model_copy(update={"conductivity": 1.7 * layer.conductivity}) for layer in LAYERS)
     own = {"W1", "W2", "W3"}
-    surfaces = tuple(
-        s.model_copy(update={"construction": "other"}) if s.name in own else s for s in table.surfaces
-    )  # fmt: skip
+    surfaces = tuple(s.model_copy(update={"construction": "other"}) if s.name in own else s for s in table.surfaces)
     drawn = Building("drawn", SITE, 0.0, ZoneTable(table.zones, surfaces, {**table.constructions, "other": better}))
     nodes = Structure(wall_nodes=2)  # as many through either construction
     wanted = matrices(build_network(drawn, structure=nodes))
