@@ -16,14 +16,15 @@ export function address(path, query = {}) {
   return `${base}${path}${text ? `?${text}` : ""}`;
 }
 
+// An answer of which only the first part came, as when the page is left meanwhile, is none.
 async function answer(request) {
-  let response;
+  let response, content;
   try {
     response = await request;
+    content = await response.json().catch((error) => { if (response.ok) throw error; return {}; });
   } catch {
     throw new Refused(0, "ServerGone", "The server does not answer. Is buildingmpc label still running? What you do is kept on this page.");
   }
-  const content = await response.json().catch(() => ({}));
   if (!response.ok) throw new Refused(response.status, content.error || "Error", content.message || response.statusText);
   return content;
 }
