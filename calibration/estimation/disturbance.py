@@ -220,6 +220,18 @@ class DisturbedSpace:
         out[r:] += self._coupling.T @ costates[:r]
         return out
 
+    def corrected(self, reach: FloatArray, weight: FloatArray) -> FloatArray:
+        """``Ā (I - P C̄' F^-1 C̄)``: a step of which the measurements have corrected the state, shape (n, n).
+
+        Parameters
+        ----------
+        reach : ndarray, shape (n, n_zone)
+            ``P C̄'`` [states times K].
+        weight : ndarray, shape (n_zone, n_zone)
+            ``F^-1`` [1/K²].
+        """
+        return self.advance(np.eye(self.n) - reach @ weight @ self.observation)
+
     def propagate(self, covariance: FloatArray) -> FloatArray:
         """``Ā P Ā' + Q``: a covariance one step on.
 

@@ -1,9 +1,12 @@
 """Gains of a filter: one for each step whose sensors or covariance differ from those of the step before."""
 
+import itertools
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from calibration.estimation.disturbance import DisturbedSpace
 from thermal._types import BoolArray, FloatArray
@@ -18,6 +21,10 @@ TOLERANCE = 1e-8
 #: Relative distance of the variances from the steady ones at which steady gains are taken up again after a step whose
 #: inputs were incomplete [-].
 _CLOSE = 0.05
+
+#: What a step by the matrix of all of it saves, in products that making the matrix takes: 18 µs of one core with 91
+#: states in 12 zones, where making takes 270 µs [-].
+_SAVED = 6000.0
 
 
 @dataclass(frozen=True)
@@ -73,6 +80,34 @@ def _weighed(gain: Gain, measured: BoolArray, noise: FloatArray) -> Gain:
     weight[rows, columns] = np.linalg.inv(spread)
     root = np.linalg.cholesky(spread)
     return replace(gain, weight=0.5 * (weight + weight.T), log_determinant=2.0 * float(np.log(root.diagonal()).sum()))
+
+
+def runs(gains: Sequence[Gain], gain_of: NDArray[np.int64]) -> Iterator[tuple[slice, Gain]]:
+    """Give the runs of steps that follow one another with one gain, in their order.
+
+    Parameters
+    ----------
+    gains : sequence of Gain
+        All of an interval.
+    gain_of : ndarray of int, shape (n_time,)
+        Which of them each step uses.
+    """
+    edges = [0, *(np.flatnonzero(np.diff(gain_of)) + 1).tolist(), len(gain_of)]
+    for start, stop in itertools.pairwise(edges):
+        yield slice(start, stop), gains[gain_of[start]]
+
+
+def pays_off(run: slice, whole: DisturbedSpace) -> bool:
+    """Whether a run is long enough to make the matrix that takes a state from one step to the next.
+
+    Parameters
+    ----------
+    run : slice
+        Its steps.
+    whole : DisturbedSpace
+        Building and disturbances.
+    """
+    return bool((run.stop - run.start - 1) * _SAVED > whole.n**2 * whole.space.n_zone)
 
 
 def exact_gains(

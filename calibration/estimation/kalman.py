@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from calibration.errors import FilterError
 from calibration.estimation.disturbance import DisturbanceModel, DisturbedSpace
-from calibration.estimation.gains import TOLERANCE, Covariance, Gain, exact_gains, steady_gains
+from calibration.estimation.gains import TOLERANCE, Covariance, Gain, exact_gains, pays_off, runs, steady_gains
 from calibration.estimation.state_space import REFERENCE, StateSpace
 from thermal._types import BoolArray, FloatArray
 from thermal.model.case_replay import Inputs
@@ -205,29 +205,38 @@ class KalmanFilter:
         pushed, through = u @ space.drive.T, u @ space.feedthrough.T
         zone, airflow = inputs.zone[rows] - REFERENCE, inputs.airflow[rows]
         measured, count = np.isfinite(zone), len(zone)
-        z = np.concatenate([start, np.zeros(space.n_zone)])
-        states, filtered = np.empty((count + 1, whole.n)), np.empty((count, whole.n))
-        predicted, errors, misfit = np.empty(zone.shape), np.empty(zone.shape), np.empty(count)
-        for k in range(count):
-            if space.flow is not None:
-                extra = space.directed_heat(airflow[k][:, None], z[:r, None])[:, 0]
-                pushed[k] += space.heat_drive @ extra
-                through[k] += space.heat_feedthrough @ extra
-            gain = gains[index[k]]
-            states[k] = z
-            predicted[k] = whole.observation @ z + through[k]
-            error = np.where(measured[k], zone[k] - predicted[k], 0.0)
-            weighted = gain.weight @ error
-            filtered[k] = z + gain.reach @ weighted
-            errors[k], misfit[k] = error, error @ weighted
-            z = whole.advance(filtered[k])
-            z[:r] += pushed[k]
-        states[count] = z
+        seen = np.where(measured, zone, 0.0)
+        states = np.empty((count + 1, whole.n))
+        states[0, :r], states[0, r:] = start, 0.0
+        for at, gain in runs(gains, index):
+            if space.flow is None and pays_off(at, whole):
+                loop, gained = whole.corrected(gain.reach, gain.weight), gain.reach @ gain.weight
+                pull = (seen[at] - through[at]) @ whole.advance(gained).T
+                pull[:, :r] += pushed[at]
+                for k, pulled in zip(range(at.start, at.stop), pull, strict=True):
+                    states[k + 1] = loop @ states[k] + pulled
+                continue
+            for k in range(at.start, at.stop):
+                z = states[k]
+                if space.flow is not None:
+                    extra = space.directed_heat(airflow[k][:, None], z[:r, None])[:, 0]
+                    pushed[k] += space.heat_drive @ extra
+                    through[k] += space.heat_feedthrough @ extra
+                weighted = gain.weight @ (seen[k] - through[k] - whole.observation @ z)
+                states[k + 1] = whole.advance(z + gain.reach @ weighted)
+                states[k + 1, :r] += pushed[k]
+        predicted = states[:count] @ whole.observation.T + through
+        errors = np.where(measured, zone - predicted, 0.0)
+        filtered, misfit = states[:count].copy(), 0.0
+        for at, gain in runs(gains, index):
+            weighted = errors[at] @ gain.weight
+            filtered[at] += weighted @ gain.reach.T
+            misfit += float(np.sum(errors[at] * weighted))
         spread = np.array([np.diag(g.seen) + whole.noise_variance for g in gains])
         left = np.array([np.diag(g.seen) - ((g.seen @ g.weight) * g.seen).sum(axis=1) for g in gains])
         heat = np.array([np.diag(g.heat[:, r:]) - ((g.reach[r:] @ g.weight) * g.reach[r:]).sum(axis=1) for g in gains])
         determinant = np.array([g.log_determinant for g in gains])[index]
-        likelihood = -0.5 * (misfit.sum() + determinant.sum() + measured.sum() * np.log(2.0 * np.pi))
+        likelihood = -0.5 * (misfit + determinant.sum() + measured.sum() * np.log(2.0 * np.pi))
         return Filtered(
             kalman=self,
             stamps=inputs.stamps[rows],

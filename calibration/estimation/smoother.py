@@ -9,7 +9,7 @@ from scipy.special import ndtri
 
 from calibration.errors import FilterError
 from calibration.estimation.disturbance import DisturbedSpace, summed_stein
-from calibration.estimation.gains import Gain
+from calibration.estimation.gains import Gain, pays_off, runs
 from calibration.estimation.kalman import Filtered
 from thermal._types import FloatArray
 
@@ -137,11 +137,19 @@ def costates(filtered: Filtered) -> tuple[FloatArray, FloatArray]:
     whole, count = filtered.kalman.whole, len(filtered.stamps)
     observe, gains, gain_of = whole.observation, filtered.gains, filtered.gain_of
     slopes, noise = np.zeros((count + 1, whole.n)), np.empty((count, whole.space.n_zone))
-    for k in range(count - 1, -1, -1):
-        gain = gains[gain_of[k]]
-        carried = whole.retreat(slopes[k + 1])
-        noise[k] = gain.weight @ (filtered.errors[k] - carried @ gain.reach)
-        slopes[k] = carried + noise[k] @ observe
+    for at, gain in reversed(list(runs(gains, gain_of))):
+        errors = filtered.errors[at]
+        if not pays_off(at, whole):
+            for k in range(at.stop - 1, at.start - 1, -1):
+                carried = whole.retreat(slopes[k + 1])
+                noise[k] = gain.weight @ (filtered.errors[k] - carried @ gain.reach)
+                slopes[k] = carried + noise[k] @ observe
+            continue
+        loop, pull = np.ascontiguousarray(whole.corrected(gain.reach, gain.weight).T), errors @ gain.weight @ observe
+        for k, pulled in zip(range(at.stop - 1, at.start - 1, -1), pull[::-1], strict=True):
+            slopes[k] = loop @ slopes[k + 1] + pulled
+        carried = whole.retreat(np.ascontiguousarray(slopes[at.start + 1 : at.stop + 1].T)).T
+        noise[at] = (errors - carried @ gain.reach) @ gain.weight
     return slopes, noise
 
 
@@ -322,7 +330,7 @@ def _steady_slopes(filtered: Filtered) -> tuple[Slopes, FloatArray]:
     slopes, noise = costates(filtered)
     gains, index, heat = filtered.gains, filtered.gain_of, slice(filtered.kalman.space.order, None)
     observe = filtered.kalman.whole.observation
-    corrections = np.array([gains[g].weight @ e for g, e in zip(index, filtered.errors, strict=True)])
+    corrections = np.concatenate([filtered.errors[at] @ gain.weight for at, gain in runs(gains, index)])
     before = slopes[:-1] - corrections @ observe
     weight = np.tensordot(np.bincount(index, minlength=len(gains)), np.array([g.weight for g in gains]), axes=1)
     by_covariance = 0.5 * (slopes.T @ slopes - before.T @ before - observe.T @ weight @ observe)
@@ -335,7 +343,7 @@ def _through_steady(filtered: Filtered, slopes: FloatArray) -> Slopes:
     """Pass through the steady covariance P, of which ``dP = L dP L' + dQ + K dR K' + dA P_f A' + A P_f dA'``."""
     whole, gain = filtered.kalman.whole, filtered.gains[0]
     heat, gained = slice(filtered.kalman.space.order, None), gain.reach @ gain.weight
-    adjoint = summed_stein(whole.advance(np.eye(whole.n) - gained @ whole.observation), slopes)
+    adjoint = summed_stein(whole.corrected(gain.reach, gain.weight), slopes)
     corrected = filtered.kalman.steady(filtered.measured)[0] - gained @ gain.reach.T
     predictor = whole.advance(gained)
     by_keep = 2.0 * np.einsum("ij,ji->", adjoint[heat], whole.advance(corrected[:, heat]))

@@ -7,6 +7,7 @@ gains as much as a true one.
 
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import suppress
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -64,7 +65,7 @@ def challenge(
     known = dict(rounds[0].before.effects)
     zoned = list(_zoned(models, {p.base for p in rounds[0].before.built.network.parameters}))
     for effects, least in _rivals(rounds, known):
-        fits = [(own, _fit(own, effects, final)) for own in zoned]
+        fits = [(own, _fit(own, effects, final, least)) for own in zoned]
         better = [(own, fit) for own, fit in fits if fit is not None and fit.evidence >= least]
         for own, other in sorted(better, key=lambda found: -found[1].evidence):
             with suppress(*_FAILURES):
@@ -78,10 +79,10 @@ def challenge(
     return models, tuple(rounds)
 
 
-def _fit(models: ModelComparison, effects: Effects, final: Fit) -> Fit | None:
-    """Fit effects from where they were found; None where that fails."""
+def _fit(models: ModelComparison, effects: Effects, final: Fit, least: float) -> Fit | None:
+    """Fit effects from where they were found, while they may reach an evidence; None where that fails."""
     try:
-        return models.fit(effects, [_values(final, effects)])
+        return models.fit(effects, [_values(final, effects)], least=least)
     except _FAILURES:
         return None
 
@@ -94,7 +95,7 @@ def _zoned(models: ModelComparison, drawn: Collection[str]) -> Iterator[ModelCom
         if scopes:
             settings = replace(models.settings, scopes={**own, **scopes})
             zoned = replace(models, settings=settings, tune=models.tuned, hold_out=models.judged)
-            zoned.drivers.openings = models.drivers.openings
+            zoned.drivers = copy(models.drivers)  # a search may find other openings about it
             yield zoned
 
 

@@ -316,6 +316,7 @@ class ModelComparison:
         starts: Sequence[Mapping[str, float]],
         built: Built | None = None,
         evaluations: int = EVALUATIONS,
+        least: float = -np.inf,
     ) -> Fit:
         """Fit a model with effects from several starts; the one of most evidence is kept.
 
@@ -330,13 +331,15 @@ class ModelComparison:
             The model, where it is at hand.
         evaluations : int
             Most evaluations of errors with derivatives from a start.
+        least : float
+            Evidence below which a fit is of no use: one that cannot reach it is given up before its end [-].
         """
         built = built or self.build(effects)
         best: Fit | None = None
         for known in starts:
             theta = built.theta(known, TYPICAL)
             problem = self.problem(built, theta)
-            model, found = solve(problem, built.grid, theta, evaluations)
+            model, found = solve(problem, built.grid, theta, evaluations, least=least)
             value = evidence_of(problem, found)
             if best is None or value > best.evidence:
                 zones = {e: tuple(z) for e, z in effects.items()}

@@ -14,6 +14,8 @@ from statsmodels.tsa.statespace.kalman_filter import KalmanFilter as Reference
 
 from calibration import DisturbanceModel, KalmanFilter, StateSpace
 from calibration.errors import FilterError
+from calibration.estimation.gains import Covariance, pays_off, runs
+from calibration.estimation.smoother import costates
 from calibration.estimation.state_space import state_space
 from thermal import Inputs
 from thermal.model.matrices import Matrices
@@ -196,6 +198,26 @@ def test_it_is_the_textbook_s_filter_with_missing_data(
     unseen = np.isnan(inputs.zone[1:]) | ~inputs.complete[1:, None]
     np.testing.assert_array_equal(np.isnan(found.innovations), unseen)
     assert found.count == (~unseen).sum()
+
+
+@pytest.mark.parametrize("covariance", ["exact", "steady"])
+def test_a_run_of_one_gain_is_its_steps_one_by_one(
+    covariance: Covariance, space_of: SpaceOf, simulated: Simulate, gaps: Gaps, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    space = space_of()
+    inputs = gaps(simulated(space, 200, 0).inputs)
+
+    def found() -> tuple[FloatArray, FloatArray, float, FloatArray, FloatArray]:
+        filtered = KalmanFilter(space, DISTURBANCE, covariance=covariance).filter(inputs, 0, 200, START)
+        assert any(pays_off(at, filtered.kalman.whole) for at, _ in runs(filtered.gains, filtered.gain_of)) == by_run
+        return (filtered.states, filtered.disturbance, filtered.log_likelihood, *costates(filtered))
+
+    by_run = True
+    together = found()
+    monkeypatch.setattr("calibration.estimation.gains._SAVED", 0.0)
+    by_run = False
+    for one, other in zip(together, found(), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-10, atol=1e-10 * np.max(np.abs(other)))
 
 
 def test_likelihood_is_the_normal_density_of_all_measurements(space_of: SpaceOf, simulated: Simulate) -> None:

@@ -192,3 +192,16 @@ def test_where_much_is_measured_a_fit_ends_within_a_share_of_its_evidence(made: 
         assert found.converged
         assert 0.5 * count * np.log(found.mean_square / best) < 0.01 * count
     assert needed[1] < needed[0]
+
+
+def test_a_fit_ends_early_where_the_evidence_asked_for_is_out_of_reach(made: list[Any]) -> None:
+    plain = linear(4.0, -4.0)
+    problem: Any = Flattered(plain.matrix, plain.wanted, plain.parameters, plain.count)
+    start = np.array([-3.0, 3.0])
+    _, whole = solve(problem, problem, start, 60)
+    reached = evidence_of(problem, whole)
+    _, within = solve(problem, problem, start, 60, least=reached - 1.0)
+    np.testing.assert_array_equal(within.point, whole.point)
+    _, beyond = solve(problem, problem, start, 60, least=reached + 5000.0)
+    assert beyond.evaluations < whole.evaluations
+    assert evidence_of(problem, beyond) < reached + 5000.0
