@@ -8,7 +8,7 @@ Run from the repository's root::
     pip install -e .
     python benchmarks/diagnosis_speed.py --case ../shared/cases/practice_everything --out results/diagnosis [--publish]
 
-``--publish`` replaces the table in ``docs/diagnosis.md``.
+``--publish`` replaces the table in ``docs/diagnosis_trials.md``.
 """
 
 from __future__ import annotations

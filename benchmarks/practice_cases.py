@@ -8,7 +8,7 @@ Run from the repository's root::
     pip install -e .
     python benchmarks/practice_cases.py --cases ../shared/cases --out results/practice [--publish]
 
-``--publish`` replaces the table in ``docs/diagnosis.md``.
+``--publish`` replaces the table in ``docs/diagnosis_trials.md``.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 To first order an effect's strengths x lower the squared errors by ``2 sᵀ x - xᵀ G x``, with the Gram matrix G of their
 projected signatures and the score s of the errors, which alone differs from draw to draw. The gain is that of (D3) in
-``docs/diagnosis.md``.
+``docs/diagnosis_method.md``.
 """
 
 from __future__ import annotations
