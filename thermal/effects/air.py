@@ -90,13 +90,15 @@ def _build_opening(builder: EffectBuilder) -> None:
 
 def _build_mixing(builder: EffectBuilder) -> None:
     heat, inside = builder.anatomy.air_heat_capacity, {room.name for room in builder.rooms}
+    by_presence = builder.parameter("door_presence_share")
     for first, second in builder.anatomy.partitions:
         if not {first, second} <= inside:
             continue
         a, b, pair = builder.anatomy.rooms[first], builder.anatomy.rooms[second], f"{first}{PAIR}{second}"
-        constant, scheduled = (builder.parameter(n, zone=pair) for n in ("door_airflow", "occupied_door_airflow"))
+        airflow = builder.parameter("door_airflow", zone=pair)
+        scheduled = by_presence * airflow
         near, far, share = paired((a.air, a.share), (b.air, b.share))
-        builder.graph.face(f"zone_mixing {pair}", constant + _PRESENCE * scheduled, near, far, heat * share)
+        builder.graph.face(f"zone_mixing {pair}", airflow - (1.0 - _PRESENCE) * scheduled, near, far, heat * share)
         name = f"presence and difference {pair}"
         signal = Signal.made(name, "K", _by_presence, "occupancy", "usual", given={"first": first, "second": second})
         builder.heat_air(a, scheduled, signal, heat)

@@ -261,7 +261,7 @@ def _refits(work: Work, gains: Sequence[Gain], ahead: Refit | None) -> list[Refi
             if g is gains[0] and kept < _KEPT * g.gain:  # a calibrated θ may have hidden it
                 tries.append(work.refit([g], work.accepted | dict(g.strengths)))
             if g.zones == ALIKE:
-                apart = (w for w in work.made.ways(g.effect) if w.zones != ALIKE and w.gain > LEAST_GAIN)
+                apart = (w for w in work.made.apart(g.effect) if w.gain > LEAST_GAIN)
                 tries.extend(work.refit([w], work.made.promised(w)) for w in apart)
             found.extend(_best_of(work, [t for t in tries if t is not None]))
     best = max((r for r in found if r.counts), key=lambda r: r.gain, default=None)

@@ -8,7 +8,7 @@ all, so that zones, pairs and generic heat are compared without another run of t
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 
@@ -194,6 +194,17 @@ class Screening:
         shown = {n: np.array(i) for n, i in members.items() if n not in silent or len(silent) == len(members)}
         return shown, everywhere
 
+    def apart(self, effect: str) -> list[Gain]:
+        """Gains of an effect whose zones differ, where tangents see a sign of it and wherever it may be.
+
+        Parameters
+        ----------
+        effect : str
+            Its id.
+        """
+        found, whole = [w for w in self.ways(effect) if w.zones != ALIKE], _zones(self.members_of(effect)[0])
+        return found + [replace(w, zones=whole) for w in found if w.zones and set(w.zones) != set(whole)]
+
     def promised(self, *gains: Gain) -> dict[str, float]:
         """Parameters where the tangents point: the effects' strengths, and what the fitted ones then would be.
 
@@ -319,8 +330,7 @@ class Screening:
         grown = self.programme.grow(list(members.values()), self.score[None], places)
         chosen = [names[k] for k in grown.order[0] if grown.chosen[0, k]]
         index = np.concatenate([members[name] for name in chosen])
-        zones = dict.fromkeys(z for name in chosen for z in name.split(PAIR))
-        return self._gain(effect, index, tuple(zones), choice_of(len(chosen), places), places)
+        return self._gain(effect, index, _zones(chosen), choice_of(len(chosen), places), places)
 
     def _gain(
         self,
@@ -376,3 +386,8 @@ def screen(models: ModelComparison, fit: Fit, candidates: Sequence[str]) -> tupl
     made = Screening(models, fit, candidates)
     gains = [made.of(e) for e in candidates if e not in fit.effects]
     return made, sorted(gains, key=lambda g: -g.gain), made.of(GENERIC.id)
+
+
+def _zones(members: Iterable[str]) -> tuple[str, ...]:
+    """Zones of members, those of pairs one by one."""
+    return tuple(dict.fromkeys(zone for member in members for zone in member.split(PAIR)))
