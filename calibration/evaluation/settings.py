@@ -312,6 +312,12 @@ def load_parameters(path: str | Path, network: ThermalNetwork) -> FloatArray:
     if not isinstance(entries, dict) or not entries:
         raise CalibrationError(f"{path}: expected a key 'parameters' with an entry a parameter, as in calibration.json")
     scales = {p.name: p.scale for p in network.parameters}
+    unknown, missing = sorted(set(entries) - set(scales) - set(network.nominal)), sorted(set(scales) - set(entries))
+    if unknown or missing:
+        raise CalibrationError(
+            f"{path}: parameters of another building, or of an earlier version: unknown {unknown or 'none'}, missing "
+            f"{missing or 'none'}; calibrate this case, or give the file that belongs to it"
+        )
     values: dict[str, float] = {}
     for name, entry in entries.items():
         value: Any = entry.get("value") if isinstance(entry, dict) else entry
@@ -321,11 +327,4 @@ def load_parameters(path: str | Path, network: ThermalNetwork) -> FloatArray:
             kind = {"linear": "a number", "logit": "a positive number of at most 1"}.get(scale, "a positive number")
             raise CalibrationError(f"{path}: parameters.{name}: expected {kind} under 'value', found {value!r}")
         values[name] = float(value)
-    unknown = sorted(set(values) - set(scales) - set(network.nominal))
-    missing = sorted(set(scales) - set(values))
-    if unknown or missing:
-        raise CalibrationError(
-            f"{path}: parameters of another building: unknown {unknown or 'none'}, missing {missing or 'none'}; "
-            "calibrate this case, or give the file that belongs to it"
-        )
     return network.values({name: value for name, value in values.items() if name in scales})

@@ -209,7 +209,7 @@ def _candidate_entry(result: Diagnosis, c: Candidate) -> dict[str, Any]:
         "name": called(c.effect).capitalize(),
         "probability": c.probability,
         "accepted": fitted is not None,
-        "where": in_zones(c.zones if fitted is None else fitted.screened.zones),
+        "where": in_zones(c.zones if fitted is None else fitted.zones),
         "acts_on": CATALOGUE[c.effect].acts_on if c.effect in CATALOGUE else "readings",
         "values": [] if fitted is None else _values(result, c.effect),
         "alike": listed(others, "or") if others else "",

@@ -237,8 +237,8 @@ def _either(result: Diagnosis, first: Refit) -> str:
 
 
 def _found(result: Diagnosis, fitted: Refit) -> str:
-    gain = fitted.screened
-    return f"{called(gain.effect, gain.zones)} ({sure(candidate(result, gain.effect).probability)} sure)"
+    effect = fitted.screened.effect
+    return f"{called(effect, fitted.zones)} ({sure(candidate(result, effect).probability)} sure)"
 
 
 def _how_far(result: Diagnosis, found: int) -> str:
@@ -270,7 +270,7 @@ def _no_gap(result: Diagnosis) -> str:
         f"fitted to, the calibrated model misses the measured zone temperatures by {kelvin(result.gap)} K on average."
     )
     if found := accepted(result):
-        names = listed([called(r.screened.effect, r.screened.zones) for r in found])
+        names = listed([called(r.screened.effect, r.zones) for r in found])
         text += f" A trace of {names} explains too little of the error to be named."
     text += comes_back(result)
     sizes = [w for w in result.detectable.values() if np.isfinite(w)]

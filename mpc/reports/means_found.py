@@ -58,7 +58,7 @@ def diagnosis_means(result: Diagnosis) -> Means:
             then += ": what heats or cools the rooms that miss most, below, without a meter."
             return Means(answer, trust, then)
         return Means(answer, trust, f"{then}. Look at: {advice}." if advice else f"{then}.")
-    effects = [(r.screened.effect, r.screened.zones) for r in found]
+    effects = [(r.screened.effect, r.zones) for r in found]
     told = listed([f"{called(e, z)}" for e, z in effects])
     likely = rivals(result, effects[0][0])
     answer = f"The plain model lacks {told}."

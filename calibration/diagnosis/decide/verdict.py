@@ -257,7 +257,7 @@ def _candidate(
     gain = best.screened if isinstance(best, Refit) else best
     home = next(r for r in rounds if any(found is best for found in (*r.gains, *r.refits)))
     group = group_of(home, effect)[: levels.LARGEST_GROUP]
-    zones = () if gain.zones == ALIKE else gain.zones
+    zones = () if gain.zones == ALIKE else best.zones
     return Candidate(effect, probability, score, group, zones, _parameters(best, effect), gain.retained, told_by)
 
 

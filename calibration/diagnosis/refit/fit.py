@@ -31,8 +31,8 @@ _TOGETHER, _CONFIRMED = 2, 0.5
 #: decides nothing and takes minutes [-].
 _MANY = 300.0
 
-#: How many times what its next step promises a fit may still gain: after two evaluations it was 1.2 times at the most,
-#: in 18 fits of masses and losses by zone of three practice cases [-].
+#: How many times what its next step promises a fit may still gain: after the second evaluation it was 1.2 times at the
+#: most, in 18 fits of masses and losses by zone of three practice cases [-].
 _HOPED = 2.0
 
 #: Share of a step below which it is given up, and least share with which the next one begins [-].
@@ -110,7 +110,7 @@ def solve(
     while not here.converged and here.evaluations < evaluations:
         ahead = _descend(problem, model, here, min(together, evaluations - here.evaluations))
         together = _TOGETHER if ahead.cost < here.cost else _SHORTENED
-        if ahead.evaluations >= _TOGETHER and _is_hopeless(problem, ahead, least):
+        if _is_hopeless(problem, ahead, least):
             return model, ahead
         if ahead.cost == here.cost or model.is_accurate(problem.theta(ahead.point), DRIFT_TOLERANCE):
             here = ahead
@@ -128,7 +128,10 @@ def solve(
 
 
 def _is_hopeless(problem: Problem, found: Found, least: float) -> bool:
-    """Whether evidence stays below what is asked for, though the fit gained twice what its next step promises."""
+    """Whether evidence stays below what is asked for, though the fit gained twice what its next step promises.
+
+    A basis that is no longer accurate flatters, so that what looks hopeless on one is.
+    """
     if least == -np.inf:
         return False
     size = found.point.size

@@ -18,6 +18,7 @@ from calibration.errors import CalibrationError
 from calibration.fit.problem import Problem
 from thermal._types import FloatArray, IntArray
 from thermal.effects.catalogue import CATALOGUE
+from thermal.effects.effect import PAIR
 from thermal.errors import ModelError
 
 #: Evaluations of a fit from one start.
@@ -159,6 +160,15 @@ class Refit:
     held_out: HeldOut
     worse: bool
     counts: bool
+
+    @property
+    def zones(self) -> tuple[str, ...]:
+        """Zones of which the fit surely has it, with a strength beyond chance; all that it was fitted in if none."""
+        problem, effect, sure = self.fit.problem, self.screened.effect, set[str]()
+        for p, z, deviation in zip(problem.parameters, self.fit.found.point, self.fit.deviations, strict=True):
+            if p.effect == effect and p.member and is_strength(p.name, effect) and abs(z) > CHANCE * deviation:
+                sure.update(p.member.split(PAIR))
+        return tuple(zone for zone in self.screened.zones if zone in sure) or self.screened.zones
 
 
 @dataclass(frozen=True)

@@ -202,8 +202,11 @@ class Screening:
         effect : str
             Its id.
         """
-        found, whole = [w for w in self.ways(effect) if w.zones != ALIKE], _zones(self.members_of(effect)[0])
-        return found + [replace(w, zones=whole) for w in found if w.zones and set(w.zones) != set(whole)]
+        found, members = [w for w in self.ways(effect) if w.zones != ALIKE], self.members_of(effect)[0]
+        if not members or any(set(w.zones) == set(_zones(members)) for w in found):
+            return found
+        index, count = np.concatenate(list(members.values())), len(members)
+        return [*found, self._gain(effect, index, _zones(members), choice_of(count, count), count)]
 
     def promised(self, *gains: Gain) -> dict[str, float]:
         """Parameters where the tangents point: the effects' strengths, and what the fitted ones then would be.
@@ -384,7 +387,7 @@ def screen(models: ModelComparison, fit: Fit, candidates: Sequence[str]) -> tupl
         Effects that the case can tell.
     """
     made = Screening(models, fit, candidates)
-    gains = [made.of(e) for e in candidates if e not in fit.effects]
+    gains = [made.of(e) for e in candidates if e not in fit.effects and made.strengths_of(e).size]
     return made, sorted(gains, key=lambda g: -g.gain), made.of(GENERIC.id)
 
 

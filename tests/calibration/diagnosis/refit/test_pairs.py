@@ -214,6 +214,21 @@ def test_a_pair_is_accepted_where_neither_member_would_be() -> None:
     assert both.fit.values[f"sensor_bias@{high}"] == pytest.approx(BIAS, abs=0.1)
 
 
+def test_zones_that_differ_are_tried_everywhere_and_told_where_it_is() -> None:
+    """A meter reads wrong in one zone of four: a strength each costs but its share everywhere, and one is told."""
+    models, low, _ = biased_and_misread()
+    baseline = models.fit({}, [{}])
+    made = Screening(models, baseline, ("flow_gain",))
+    some, everywhere = made.apart("flow_gain")
+    zones = set(models.case.building.zone_names)
+    assert low in some.zones and set(some.zones) < zones == set(everywhere.zones)
+    assert everywhere.choice == pytest.approx(np.log(2.0)) and everywhere.places == len(zones)
+    assert set(everywhere.strengths) == {f"flow_gain@{zone}" for zone in zones}
+    found = Work(models, baseline, held_out(models, baseline), made).refit([everywhere], made.promised(everywhere))
+    assert found is not None
+    assert set(found.screened.zones) == zones and low in found.zones and set(found.zones) < zones
+
+
 def test_what_all_zones_have_alike_is_one_strength(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every valve leaks as much that no meter sees: a strength a zone is too dear, one for all is found and fitted."""
     monkeypatch.setitem(CATALOGUE, "valve_leak", replace(CATALOGUE["valve_leak"], alike=True))
