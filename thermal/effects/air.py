@@ -1,6 +1,5 @@
 """Air that comes from outdoor or from the next zone: infiltration, thermal bridges, open windows, mixing."""
 
-import casadi as ca
 import numpy as np
 
 from thermal._types import FloatArray
@@ -92,7 +91,9 @@ def _build_opening(builder: EffectBuilder) -> None:
 def _build_mixing(builder: EffectBuilder) -> None:
     heat, inside = builder.anatomy.air_heat_capacity, {room.name for room in builder.rooms}
     pairs = [pair for pair in builder.anatomy.partitions if set(pair) <= inside]
-    by_presence = builder.parameter("door_presence_share") if pairs else ca.SX(0.0)
+    if not pairs:
+        return
+    by_presence = builder.parameter("door_presence_share")
     for first, second in pairs:
         a, b, pair = builder.anatomy.rooms[first], builder.anatomy.rooms[second], f"{first}{PAIR}{second}"
         airflow = builder.parameter("door_airflow", zone=pair)
