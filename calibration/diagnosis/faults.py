@@ -118,7 +118,7 @@ def suspected(case: Case) -> Iterator[Fault]:
     """
     for seen in clock_errors(case):
         if seen.moved and seen.certainty in _PROBABILITY:
-            yield Fault("clock_shift", (), seen.moved, seen, _moved(case, seen.moved))
+            yield Fault("clock_shift", (), seen.moved, seen, case.with_weather_moved(seen.moved))
     for seen in exchanged_zones(case):
         columns = [c for c in seen.columns if c.endswith(f"/{ZONE_TEMPERATURE}")]
         if len(columns) == 2 and seen.certainty in _PROBABILITY:
@@ -231,13 +231,6 @@ def _parameters(fault: Fault) -> dict[str, Estimate]:
 def _zones_of(case: Case, columns: Sequence[str]) -> tuple[str, ...]:
     names = {c.partition("/")[0] for c in columns}
     return tuple(z for z in case.building.zone_names if names & {z, *(d.name for d in case.building.devices_of(z))})
-
-
-def _moved(case: Case, hours: float) -> Case:
-    frame = case.telemetry.frame.copy()
-    weather = [str(c) for c in frame if str(c).startswith(f"{case.building.weather_station}/")]
-    frame[weather] = frame[weather].shift(round(hours * 3600.0 / case.step)).ffill().bfill()
-    return Case(case.building, replace(case.telemetry, frame=frame))
 
 
 def _exchanged(case: Case, columns: list[str]) -> Case:

@@ -303,7 +303,7 @@ class _Walk:
         parameters = {
             c.name: {"value": c.value, "unit": c.unit, "moved": float(last.mean[k]),
                      "deviation": float(spread[k])}
-            for k, c in enumerate(columns) if not c.is_unknown
+            for k, c in enumerate(columns) if c.spread > 0.0 and not c.is_unknown
         }  # fmt: skip
         return Course(
             tuple(events), tuple(self.withdrawn), self.evidence, self.size, self.carried, self.threshold, parameters,

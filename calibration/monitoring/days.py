@@ -19,9 +19,9 @@ from calibration.evaluation.intervals import Interval, Runs, select_runs
 from calibration.progress import Progress
 from thermal._types import BoolArray, FloatArray, IntArray
 from thermal.effects.catalogue import effect_of
-from thermal.effects.effect import PAIR
+from thermal.effects.effect import zones_of
 from thermal.effects.unknown import UNKNOWN
-from thermal.model.case_replay import Inputs
+from thermal.model.case_replay import Inputs, replay_inputs
 from thermal.model.reduce import SHIFTS, reduced_model
 from thermal.parameters import Parameter
 from thermal.units import AIR_HEAT_CAPACITY
@@ -39,10 +39,13 @@ NO_CAUSE = ("heat_always", "heat_by_cold", "heat_by_occupancy")
 #: Effects that a fit of the first weeks has in it where the case can tell them: any office has windows, leaks, people.
 USUAL = ("solar_gain", "infiltration", "internal_gains")
 
-#: Strengths whose errors are far from linear in them, and where the secant is taken that stands for their tangent
+#: Strengths whose errors are far from linear in them, and where secants are taken that stand for their tangent
 #: [parameter units]: at little lost capacity only the hours of the largest load count, and an open door evens out what
-#: its tangent takes for a heat that never ends.
-_SECANTS = {"capacity_lost": 0.35, "door_airflow": 0.1}
+#: its tangent takes for a heat that never ends. Each secant is sought for itself.
+_SECANTS = {"capacity_lost": (0.2, 0.6), "door_airflow": (0.1,)}
+
+#: Strength of a clock that is wrong by an hour: weather that is moved tells it, sun and all, and not its tangent.
+_CLOCK = "weather_clock_shift"
 
 #: Deviation of a strength that no fit had, before the data, over that of a diagnosis [-]: the first weeks are taken for
 #: sound, so that what is not there is not there. What a strength may have been from the beginning takes up a change of
@@ -147,6 +150,7 @@ def days_of_case(
     effects: Mapping[str, Sequence[str]],
     values: Mapping[str, float],
     candidates: Sequence[str],
+    moved: Sequence[ModelComparison] = (),
     progress: Progress | None = None,
 ) -> Days:
     """Run the model over all the telemetry, with the sensitivities to all that may be or change.
@@ -161,6 +165,9 @@ def days_of_case(
         Its parameters by name [parameter units].
     candidates : sequence of str
         Effects that it lacks, and that the case can tell.
+    moved : sequence of ModelComparison
+        The case with its weather an hour too early and too late, which say what a wrong clock does; none where the
+        weather's clock is not watched.
     progress : callable, optional
         Called with stage, done, total.
 
@@ -171,9 +178,10 @@ def days_of_case(
     """
     built = models.build({**effects, **{e: () for e in candidates if e not in effects}})
     theta = built.theta(values)
-    replay = _Replay(models, built, theta)
+    replay = _Replay(models, built, theta, [replay_inputs(m.case, built.network, m.drivers) for m in moved])
     own, dates = built.network.parameters, replay.dates
-    errors, slopes = np.full((len(dates), *replay.shape), np.nan), np.zeros((len(dates), *replay.shape, len(theta)))
+    by = [*range(len(theta)), *replay.further]
+    errors, slopes = np.full((len(dates), *replay.shape), np.nan), np.zeros((len(dates), *replay.shape, len(by)))
     chunks = range(0, len(dates), _CHUNK)
     for number, begin in enumerate(chunks):
         if progress is not None:
@@ -181,13 +189,15 @@ def days_of_case(
         part = slice(begin, min(begin + _CHUNK, len(dates)))
         errors[part], slopes[part] = replay.with_slopes(part)
     NotEnoughDataError.unless(np.isfinite(errors).any(), "telemetry", "a day with a run of the horizon", "none")
-    onset = np.zeros((ONSET, *replay.shape, len(theta)))
+    onset = np.zeros((ONSET, *replay.shape, len(by)))
     for i, p in enumerate(own):
         if p.base == "sensor_bias" and p.member is not None:
             onset[..., i] = replay.onset_of_bias(built.network.zones.index(p.member), errors, slopes[..., i])
     n_error = errors[0].size
     by_day, at_onset = slopes.reshape(len(dates), n_error, -1), onset.reshape(ONSET, n_error, -1)
-    columns = [_column(p, v, p.effect in effects or p.effect is None) for p, v in zip(own, theta, strict=True)]
+    columns = [_column(own[i], theta[i], own[i].effect in effects or own[i].effect is None) for i in by]
+    # a further secant is no further strength
+    columns[len(theta) :] = [replace(c, spread=0.0) for c in columns[len(theta) :]]
     told = np.abs(by_day).max(axis=(0, 1)) > 0.0
     return Days(
         dates, errors.reshape(len(dates), -1), by_day[..., told],
@@ -232,8 +242,9 @@ def coming(over: int, onset: FloatArray) -> tuple[FloatArray, FloatArray]:
 class _Replay:
     """Runs of the model from midnight to midnight, half way and at their end."""
 
-    def __init__(self, models: ModelComparison, built: Built, theta: FloatArray) -> None:
+    def __init__(self, models: ModelComparison, built: Built, theta: FloatArray, moved: Sequence[Inputs]) -> None:
         self.built, self.theta, self.spin_up = built, theta, models.settings.spin_up_seconds
+        self.moved = moved
         # a basis of this θ alone interpolates tangents too, as in a screening
         self.model = reduced_model(built.grid, [theta], shifts=SHIFTS)
         self.problem = models.problem(built, theta)
@@ -249,14 +260,30 @@ class _Replay:
         last = stamps[-1] - pd.Timedelta(seconds=built.inputs.step)  # a stamp ends its step
         self.dates = pd.date_range(stamps[0].normalize(), last.normalize(), freq="D")
 
+    @property
+    def further(self) -> list[int]:
+        """Parameters that have further secants, once for each."""
+        own = self.built.network.parameters
+        return [i for i, p in enumerate(own) for _ in _SECANTS.get(p.base, ())[1:]]
+
     def with_slopes(self, part: slice) -> tuple[FloatArray, FloatArray]:
-        """Errors of some days (n_day, n_run, n_kept, n_zone) [K], and their derivatives on the estimation scale."""
+        """Errors of some days (n_day, n_run, n_kept, n_zone) [K], and their derivatives on the estimation scale.
+
+        Derivatives by the parameters, and after them the further secants.
+        """
         errors, slopes = self._run(part, self.theta, self.built.inputs, slopes=True)
+        further = []
         for i, p in enumerate(self.built.network.parameters):
-            if (at := _SECANTS.get(p.base)) is not None:
-                there = self.theta + (np.arange(self.theta.size) == i) * at
-                slopes[..., i] = np.nan_to_num(self._run(part, there, self.built.inputs)[0] - errors) / at
-        return errors, slopes * self.scale
+            if at := _SECANTS.get(p.base, ()):
+                there = [self.theta + (np.arange(self.theta.size) == i) * a for a in at]
+                first, *others = (np.nan_to_num(self._run(part, t, self.built.inputs)[0] - errors) for t in there)
+                slopes[..., i] = first / at[0]
+                further += [other / a for other, a in zip(others, at[1:], strict=True)]
+            elif p.base == _CLOCK and self.moved:
+                earlier, later = (self._run(part, self.theta, inputs)[0] for inputs in self.moved)
+                slopes[..., i] = np.nan_to_num(later - earlier) / 2.0
+        scale = np.append(self.scale, self.scale[self.further])
+        return errors, np.stack([*np.moveaxis(slopes, -1, 0), *further], axis=-1) * scale
 
     def onset_of_bias(self, zone: int, errors: FloatArray, slopes: FloatArray) -> FloatArray:
         """First days of a sensor that begins to read 1 K more, (n_onset, n_run, n_kept, n_zone) [K], less later ones.
@@ -312,7 +339,7 @@ class _Replay:
 def _column(p: Parameter, value: float, present: bool) -> Column:
     """Tell what a parameter is to a monitoring."""
     zonal = effect_of(p.effect).zonal if p.effect is not None else False
-    zones = tuple(p.member.split(PAIR)) if zonal and p.member is not None else ()
+    zones = zones_of([p.member]) if zonal and p.member is not None else ()
     changes = is_strength(p.name, p.effect) and p.effect in (*MAY_CHANGE, *NO_CAUSE)
     return Column(
         p.name, p.unit, p.effect, zones, p.prior_deviation, p.prior_deviation * (1.0 if present else _SELDOM),

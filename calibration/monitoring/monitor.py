@@ -22,7 +22,7 @@ from calibration.monitoring.course import Course, Event, follow
 from calibration.monitoring.days import MAY_CHANGE, NO_CAUSE, USUAL, Days, days_of_case
 from calibration.progress import Progress
 from calibration.results import Axes, Result, plain
-from thermal._types import BoolArray
+from thermal._types import BoolArray, FloatArray
 from thermal.case.case import Case
 from thermal.effects.catalogue import CATALOGUE
 from thermal.inputs.normalisation import Normalisation, fit_normalisation
@@ -33,6 +33,9 @@ REFERENCE_DAYS, _FEWEST_DAYS = 42, 14
 
 #: Days whose mean temperature of a zone is usual for the season [d]: a week, so that days off are in it.
 _SEASON = 7
+
+#: Days of which a zone exceeds its largest heat 1 % of the time [d].
+_PEAKS = 14
 
 #: Zones beyond which a day has too many errors for one covariance.
 _MOST_ZONES = 40
@@ -223,7 +226,7 @@ def monitor(
     given = ModelSettings(**read_settings(parameters)) if parameters is not None else ModelSettings()
     made = replace(given, effects={}, dx=chosen.dx if chosen.dx is not None else given.dx)
     models = ModelComparison(case, made, [reference], horizon=chosen.horizon)
-    drivers = _with_windows(case, fit_normalisation(case, [(reference.start, reference.end)]))
+    drivers = _of_seasons(case, fit_normalisation(case, [(reference.start, reference.end)]))
     models.drivers = drivers
     untestable = models.untestable()
     said = reasons_of(chosen.known or (), chosen.ruled_out, untestable)
@@ -241,7 +244,8 @@ def monitor(
     # what is in the model is watched like all else
     untestable = {e: why for e, why in untestable.items() if e not in effects or e in chosen.ruled_out}
     candidates = [e for e in CATALOGUE if e not in untestable and not (set(CATALOGUE[e].requires) - set(effects))]
-    days = days_of_case(models, effects, values, [*candidates, *NO_CAUSE], progress)
+    moved = [_moved(models, hours) for hours in (-1.0, 1.0)]
+    days = days_of_case(models, effects, values, [*candidates, *NO_CAUSE], moved, progress)
     course = follow(days, chosen.reference_days, chosen.ruled_out, progress)
     watched = {e: r for e, r in untestable.items() if e in MAY_CHANGE}
     source = Path(parameters).name if parameters is not None else "fitted to the reference days"
@@ -251,7 +255,7 @@ def monitor(
     )  # fmt: skip
 
 
-def _with_windows(case: Case, normalisation: Normalisation) -> InputProvider:
+def _of_seasons(case: Case, normalisation: Normalisation) -> InputProvider:
     """Read the inputs, and let a window of every zone stand open in them, so that its strength is the area that does.
 
     Air leaves at what is usual for the season: the mean of the week before at the same time of the day. Temperatures of
@@ -265,7 +269,22 @@ def _with_windows(case: Case, normalisation: Normalisation) -> InputProvider:
         week = at_this_time.transform(lambda of: of.shift().rolling(_SEASON, min_periods=1).mean())
         seasonal.usual = np.where(week.notna(), week, seasonal.usual)
         drivers.through_windows = seasonal.through_windows
+    drivers.largest_heat = np.maximum(drivers.largest_heat, _largest_heat(case))
     return drivers
+
+
+def _largest_heat(case: Case) -> FloatArray:
+    """Largest heat that terminals were seen to give before each day, shape (n_time, n_zone) [W]: cooling in spring."""
+    within = case.zone_heat().abs().rolling(f"{_PEAKS}D", min_periods=1).quantile(0.99)
+    by_day = within.groupby(case.stamps.normalize()).last().cummax().ffill().shift()
+    return np.asarray(by_day.fillna(0.0).reindex(case.stamps.normalize()))
+
+
+def _moved(models: ModelComparison, hours: float) -> ModelComparison:
+    """Move the weather of a case."""
+    moved = replace(models, case=models.case.with_weather_moved(hours))
+    moved.drivers = _of_seasons(moved.case, models.drivers.normalisation)
+    return moved
 
 
 def _reference(case: Case, settings: MonitorSettings) -> Interval:

@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from zoneinfo import ZoneInfo
 
+import numpy as np
 import pandas as pd
 
 from thermal.case.building import OUTDOOR, Building
@@ -154,6 +155,26 @@ class Case:
         missing = tuple(stamp for stamp in self.telemetry.missing_rows if ends[0] <= stamp <= ends[1])
         telemetry = Telemetry(frame=frame, step=self.step, missing_rows=missing)
         return replace(self, telemetry=telemetry, judged=self.quality.restricted(*ends))
+
+    def with_weather_moved(self, hours: float) -> Case:
+        """Move what the weather station says, as if its clock had been wrong.
+
+        Parameters
+        ----------
+        hours
+            By how much later it is said [h], rounded to a step at least; negative for earlier.
+
+        Returns
+        -------
+        Case
+            With the same stamps; what comes in at an end is the value there.
+        """
+        frame = self.telemetry.frame.copy()
+        steps = round(hours * 3600.0 / self.step) or (1 if hours > 0.0 else -1)
+        columns = [str(c) for c in frame if str(c).startswith(f"{self.building.weather_station}/")]
+        rows = np.clip(np.arange(len(frame)) - steps, 0, len(frame) - 1)
+        frame[columns] = frame[columns].to_numpy()[rows]
+        return Case(self.building, replace(self.telemetry, frame=frame))
 
     def weather(self) -> pd.DataFrame:
         """Weather, as far as the station measures it.

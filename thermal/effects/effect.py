@@ -1,7 +1,7 @@
 """What an effect of the catalogue is, and how it joins a building's network."""
 
 import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from typing import Any
@@ -26,6 +26,22 @@ PAIR = " + "
 
 #: In the place of an effect's zones: all of them, with one strength.
 ALIKE = ("*",)
+
+
+def zones_of(members: Iterable[str]) -> tuple[str, ...]:
+    """Name the zones that strengths belong to, those of pairs one by one, each once.
+
+    Parameters
+    ----------
+    members : iterable of str
+        Zones and pairs of zones.
+
+    Examples
+    --------
+    >>> zones_of(["hall + kitchen", "kitchen"])
+    ('hall', 'kitchen')
+    """
+    return tuple(dict.fromkeys(zone for member in members for zone in member.split(PAIR)))
 
 
 @dataclass(frozen=True)

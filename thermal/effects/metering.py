@@ -39,7 +39,7 @@ def _duct(inputs: InputProvider, zone: str, exponent: float) -> FloatArray:
 
 
 def _over(inputs: InputProvider, zone: str, lost: float) -> FloatArray:
-    heat, most = of_zone(inputs, "heat", zone), inputs.normalisation.heat.get(zone, 0.0)
+    heat, most = of_zone(inputs, "heat", zone), inputs.largest_heat[:, inputs.zones.index(zone)]
     return np.asarray(np.sign(heat) * np.maximum(np.abs(heat) - (1.0 - lost) * most, 0.0))
 
 

@@ -291,6 +291,15 @@ class InputProvider:
         return np.asarray(np.array([profile[zone] for zone in self.zones]).T[slot])
 
     @cached_property
+    def largest_heat(self) -> FloatArray:
+        """Metered heat, heating or cooling, that each zone exceeds 1 % of the time, shape (n_time, n_zone) [W].
+
+        That of the normalisation at all times, unless a monitoring, which learns it as seasons come, sets it.
+        """
+        largest = [self.normalisation.heat.get(zone, 0.0) for zone in self.zones]
+        return np.broadcast_to(largest, (len(self.stamps), len(self.zones)))
+
+    @cached_property
     def _counted(self) -> FloatArray | None:
         """People counted over their largest number, shape (n_time,) [-]; None where nobody counts them."""
         most = self.normalisation.people

@@ -170,6 +170,20 @@ class Fit:
         """Standard errors of the parameters on the estimation scale, shape (n_parameter,) [-]."""
         return np.asarray(np.sqrt(np.diag(self.covariance)))
 
+    def members(self, effect: str) -> dict[str, float]:
+        """Zones, or pairs of zones, that have a strength of an effect, with the largest over its standard error [-].
+
+        Parameters
+        ----------
+        effect : str
+            One of `effects`.
+        """
+        beyond: dict[str, float] = {}
+        for p, z, deviation in zip(self.problem.parameters, self.point, self.deviations, strict=True):
+            if p.effect == effect and p.member and is_strength(p.name, effect):
+                beyond[p.member] = max(beyond.get(p.member, 0.0), float(abs(z)) / deviation)
+        return beyond
+
     @cached_property
     def values(self) -> dict[str, float]:
         """Parameters by name [parameter units]."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
-from calibration.diagnosis.refit.comparison import Fit, ModelComparison, is_strength
+from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.diagnosis.screen.gains import MATTERS, Gain, choice_of
 from calibration.diagnosis.screen.openings import openings_beyond
 from calibration.diagnosis.screen.screen import Screening
@@ -18,7 +18,7 @@ from calibration.errors import CalibrationError
 from calibration.fit.problem import Problem
 from thermal._types import FloatArray, IntArray
 from thermal.effects.catalogue import CATALOGUE
-from thermal.effects.effect import PAIR
+from thermal.effects.effect import zones_of
 from thermal.errors import ModelError
 
 #: Evaluations of a fit from one start.
@@ -164,10 +164,7 @@ class Refit:
     @property
     def zones(self) -> tuple[str, ...]:
         """Zones of which the fit surely has it, with a strength beyond chance; all that it was fitted in if none."""
-        problem, effect, sure = self.fit.problem, self.screened.effect, set[str]()
-        for p, z, deviation in zip(problem.parameters, self.fit.found.point, self.fit.deviations, strict=True):
-            if p.effect == effect and p.member and is_strength(p.name, effect) and abs(z) > CHANCE * deviation:
-                sure.update(p.member.split(PAIR))
+        sure = zones_of(m for m, beyond in self.fit.members(self.screened.effect).items() if beyond > CHANCE)
         return tuple(zone for zone in self.screened.zones if zone in sure) or self.screened.zones
 
 
@@ -228,7 +225,7 @@ class Work:
         anew : Fit
             The model with them.
         """
-        choice = sum(choice_of(_places(anew, g.effect), g.places) for g in gains if g.places)
+        choice = sum(choice_of(len(anew.members(g.effect)), g.places) for g in gains if g.places)
         gain = float(anew.evidence - self.fit.evidence - choice)
         fall = float(np.sqrt(self.fit.found.mean_square) - np.sqrt(anew.found.mean_square))
         errors = held_out(self.models, anew)
@@ -272,12 +269,6 @@ def beyond_a_step(problem: Problem, theta: FloatArray, deviations: FloatArray, s
     at = [k for k, p in enumerate(problem.parameters) if p.name in shifts]
     moved = np.abs(theta[[problem.free[k] for k in at]]) - CHANCE * deviations[at]
     return not at or bool(np.any(moved > step))
-
-
-def _places(fit: Fit, effect: str) -> int:
-    """Count the zones, or pairs of zones, in which a fitted model has an effect."""
-    mine = (p for p in fit.problem.parameters if p.effect == effect and is_strength(p.name, effect))
-    return len({p.member for p in mine} - {None})
 
 
 def look_again(work: Work, gains: Sequence[Gain], refits: Sequence[Refit], best: Refit | None) -> list[Refit]:

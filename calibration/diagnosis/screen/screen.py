@@ -8,7 +8,7 @@ all, so that zones, pairs and generic heat are compared without another run of t
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 
@@ -20,7 +20,7 @@ from calibration.diagnosis.screen.generic import GENERIC, TIGHTNESS, ZONE_HEAT
 from calibration.diagnosis.screen.programme import Programme
 from thermal._types import BoolArray, FloatArray, IntArray
 from thermal.effects.catalogue import CATALOGUE
-from thermal.effects.effect import ALIKE, PAIR, Chosen
+from thermal.effects.effect import ALIKE, Chosen, zones_of
 from thermal.model.reduce import FEW_SHIFTS, SHIFTS, reduced_model
 from thermal.parameters import Parameter
 
@@ -203,10 +203,10 @@ class Screening:
             Its id.
         """
         found, members = [w for w in self.ways(effect) if w.zones != ALIKE], self.members_of(effect)[0]
-        if not members or any(set(w.zones) == set(_zones(members)) for w in found):
+        if not members or any(set(w.zones) == set(zones_of(members)) for w in found):
             return found
         index, count = np.concatenate(list(members.values())), len(members)
-        return [*found, self._gain(effect, index, _zones(members), choice_of(count, count), count)]
+        return [*found, self._gain(effect, index, zones_of(members), choice_of(count, count), count)]
 
     def promised(self, *gains: Gain) -> dict[str, float]:
         """Parameters where the tangents point: the effects' strengths, and what the fitted ones then would be.
@@ -333,7 +333,7 @@ class Screening:
         grown = self.programme.grow(list(members.values()), self.score[None], places)
         chosen = [names[k] for k in grown.order[0] if grown.chosen[0, k]]
         index = np.concatenate([members[name] for name in chosen])
-        return self._gain(effect, index, _zones(chosen), choice_of(len(chosen), places), places)
+        return self._gain(effect, index, zones_of(chosen), choice_of(len(chosen), places), places)
 
     def _gain(
         self,
@@ -389,8 +389,3 @@ def screen(models: ModelComparison, fit: Fit, candidates: Sequence[str]) -> tupl
     made = Screening(models, fit, candidates)
     gains = [made.of(e) for e in candidates if e not in fit.effects and made.strengths_of(e).size]
     return made, sorted(gains, key=lambda g: -g.gain), made.of(GENERIC.id)
-
-
-def _zones(members: Iterable[str]) -> tuple[str, ...]:
-    """Zones of members, those of pairs one by one."""
-    return tuple(dict.fromkeys(zone for member in members for zone in member.split(PAIR)))

@@ -11,9 +11,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from calibration.diagnosis.refit.comparison import ModelComparison
 from calibration.errors import CalibrationError, HorizonError, NotEnoughDataError
-from calibration.monitoring.monitor import Monitoring, MonitorSettings, _with_windows, monitor
+from calibration.evaluation.intervals import Interval
+from calibration.evaluation.settings import ModelSettings
+from calibration.monitoring.days import days_of_case
+from calibration.monitoring.monitor import Monitoring, MonitorSettings, _moved, _of_seasons, monitor
 from mpc.reports.monitoring import monitoring_verdict, write_monitoring
+from thermal._types import FloatArray
 from thermal.case.case import Case
 from thermal.data import load_bundled_case
 from thermal.errors import EffectError
@@ -106,11 +111,48 @@ def test_open_windows_lose_air_of_the_season(quiet: Case) -> None:
     frame.loc[late, columns] += 5.0
     warmer = Case(quiet.building, replace(quiet.telemetry, frame=frame))
     reference = fit_normalisation(quiet, [(quiet.stamps[0], quiet.stamps[0] + pd.Timedelta(days=REFERENCE))])
-    cold = [_with_windows(case, reference).through_windows for case in (quiet, warmer)]
+    cold = [_of_seasons(case, reference).through_windows for case in (quiet, warmer)]
     day = np.asarray((quiet.stamps - quiet.stamps[0].normalize()).days)
     assert cold[1][day <= CHANGED - 1] == pytest.approx(cold[0][day <= CHANGED - 1])
     assert cold[1][day == CHANGED] == pytest.approx(cold[0][day == CHANGED])
     assert (cold[1][day > CHANGED + 8] < cold[0][day > CHANGED + 8] - 5.0 * 0.05).all()  # 0.05 m/s in still air at 0 K
+
+
+def test_terminals_show_what_they_can_give_as_seasons_come(quiet: Case) -> None:
+    """Twice the flow from a day on counts as the largest heat from the next day on, and never before."""
+    zone, frame = quiet.building.zone_names[0], quiet.telemetry.frame.copy()
+    late = frame.index >= frame.index[0].normalize() + pd.DateOffset(days=CHANGED)
+    frame.loc[late, f"VAV_{zone}/supply_air_flowrate_sensor"] *= 2.0
+    stronger = Case(quiet.building, replace(quiet.telemetry, frame=frame))
+    reference = fit_normalisation(quiet, [(quiet.stamps[0], quiet.stamps[0] + pd.Timedelta(days=REFERENCE))])
+    before, after = (_of_seasons(case, reference).largest_heat[:, 0] for case in (quiet, stronger))
+    day = np.asarray((quiet.stamps - quiet.stamps[0].normalize()).days)
+    assert (before >= reference.heat[zone]).all() and (np.diff(before) >= 0.0).all()
+    assert after[day <= CHANGED] == pytest.approx(before[day <= CHANGED])
+    assert (after[day > CHANGED + 4] > 1.5 * before[day > CHANGED + 4]).all()
+
+
+def test_a_wrong_clock_shows_as_its_column_says() -> None:
+    """Weather that is said an hour late moves the sun too, which the tangent of the outdoor temperature lacks."""
+    case = load_bundled_case()
+    models = ModelComparison(case, ModelSettings(dx=2.0), [Interval(case.stamps[0], case.stamps[len(case.stamps) // 2])])
+    models.drivers = _of_seasons(case, fit_normalisation(case))
+    effects, values = {"solar_gain": ()}, {"solar_heat_gain_coefficient": 0.5}
+    moved = [_moved(models, hours) for hours in (-1.0, 1.0)]
+    late, moves = (_errors_and_clock(m, effects, values, moved) for m in (moved[1], models))
+    seen = late[0] - moves[0]
+    _, tangent = _errors_and_clock(models, effects, values, [])
+    left = [np.sqrt(np.nanmean((seen - s) ** 2) / np.nanmean(seen**2)) for s in (moves[1], tangent)]
+    assert left[0] < 0.3 < 0.8 < left[1]
+
+
+def _errors_and_clock(
+    models: ModelComparison, effects: dict[str, tuple[str, ...]], values: dict[str, float],
+    moved: Sequence[ModelComparison],
+) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+    days = days_of_case(models, effects, values, ["clock_shift"], moved)
+    number = [c.name for c in days.columns].index("weather_clock_shift")
+    return days.errors, days.slopes[..., number]
 
 
 def test_what_is_in_the_model_is_watched(quiet: Case) -> None:
