@@ -24,6 +24,10 @@ THRESHOLD = 12.0
 #: Days after an alarm by which a change is named [d]: evidence that is enough for an alarm is not always for a name.
 NAMING_DAYS = 7
 
+#: Share of the threshold under which an alarm is withdrawn once it may be named [-], and days after which it is where
+#: its evidence stays between the two [d]: a few days unlike others take evidence away from a change that lasts, too.
+_GONE, _LONGEST_WAIT = 0.5, 21
+
 #: Share of the evidence for the end of a change from which an alarm closes it [-].
 _CLOSES = 0.5
 
@@ -95,7 +99,7 @@ class Course:
     events : tuple of Event
         In the order in which they were noticed.
     withdrawn : tuple of int
-        Days of alarms whose evidence was gone a week later.
+        Days of alarms whose evidence was gone a week later, or not enough for three weeks.
     evidence : ndarray, shape (n_day,)
         Logarithm of the evidence that something has changed [-]; NaN while nothing is watched.
     size : ndarray, shape (n_day,)
@@ -215,7 +219,7 @@ class _Walk:
             ends = [(place, size) for place, size in zip(self.places, self._sizes(state), strict=True)]
             self.lasting = [k for k, e in enumerate(self.events) if e.end is None]
             cap = self.threshold / 2.0  # no single day may raise an alarm
-            self.watch = Watch(self.what, state.mean.size, self.dispersion, cap, [ends[k] for k in self.lasting])
+            self.watch = Watch(self.what, state, self.dispersion, cap, [ends[k] for k in self.lasting])
         alarm = self.watch.take(day, self.days, innovation, self.pending)
         if self.pending is None:
             self.evidence[day] = alarm.log_evidence
@@ -241,8 +245,10 @@ class _Walk:
         if day - noticed < NAMING_DAYS and day + 1 < len(self.days):
             return
         if alarm.log_evidence < self.threshold:  # a few days unlike others look like a change and do not last
-            self.withdrawn.append(noticed)
-            self._watch_anew(day)
+            last = day - noticed >= _LONGEST_WAIT or day + 1 == len(self.days)
+            if last or alarm.log_evidence < _GONE * self.threshold:
+                self.withdrawn.append(noticed)
+                self.pending = None
             return
         number, event = self._named(alarm, day, watch, noticed)
         for k in self.lasting:
@@ -268,9 +274,6 @@ class _Walk:
         """Filter anew from a day on, and watch again once today is past."""
         self.day = start
         self.states = self.states[: start + 1]
-        self._watch_anew(day)
-
-    def _watch_anew(self, day: int) -> None:
         self.watched_from, self.watch, self.pending = day + 1, None, None
 
     def _named(self, alarm: Alarm, day: int, watch: Watch, noticed: int) -> tuple[int, Event]:

@@ -85,8 +85,9 @@ class Column:
         Where the model is [parameter unit].
     may_change : bool
         Whether it may change from one day to the next.
-    from_zero : bool
-        Whether it can only grow, as the strength of what is absent at first.
+    least : float
+        Change that takes it to 0 where it cannot be less, as a leak cannot: 0 for what is absent, minus infinity where
+        there is no such end [estimation scale].
     """
 
     name: str
@@ -98,7 +99,7 @@ class Column:
     away: float
     value: float
     may_change: bool
-    from_zero: bool
+    least: float
 
     @property
     def is_unknown(self) -> bool:
@@ -344,5 +345,5 @@ def _column(p: Parameter, value: float, present: bool) -> Column:
     return Column(
         p.name, p.unit, p.effect, zones, p.prior_deviation, p.prior_deviation * (1.0 if present else _SELDOM),
         p.transform(p.start) - p.transform(value), float(value),
-        may_change=changes, from_zero=not present and p.lower == 0.0,
+        may_change=changes, least=-float(value) if changes and p.lower == 0.0 else -np.inf,
     )  # fmt: skip

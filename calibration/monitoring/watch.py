@@ -6,7 +6,9 @@ of the change so far is in its states (Willsky and Jones 1976, doi:10.1109/TAC.1
     G_d = J_d - H_d F_d,   F_d+1 = F_d + K_d G_d,   S = Σ Gᵀ V⁻¹ ν,   I = Σ Gᵀ V⁻¹ G                             (M2)
 
 With p ~ N(0, σ²) before the data the likelihood ratio has the mean ``E = (1 + σ² I)^-½ exp(½ S² / (I + σ^-2))``, whose
-expectation is 1 while nothing changes. The sum of the ratios over all τ, weighted over all that may change, is the
+expectation is 1 while nothing changes. Where the strength v ~ N(u, s²) cannot become less than 0, both normal
+distributions end where v + p does, and with the mean m and the variance q of p by the data E takes the factor
+``Φ((m + u) / (q + s²)^½) / Φ(u / (σ² + s²)^½)``. The sum of the ratios over all τ, weighted over all that may change, is the
 e-detector of Shiryaev and Roberts, and an alarm where it exceeds A comes on average after A days or more while nothing
 has changed (Shin, Ramdas and Rinaldo 2024, doi:10.51387/23-NEJSDS51), whatever the number of changes that are sought.
 """
@@ -21,7 +23,7 @@ from scipy.linalg import solve_triangular
 from scipy.special import log_ndtr, logsumexp
 
 from calibration.monitoring.days import NO_CAUSE, Column, Days, coming
-from calibration.monitoring.filter import Innovation
+from calibration.monitoring.filter import Innovation, State
 from thermal._types import FloatArray, IntArray
 
 #: Days since when a change is sought: each of the last ones, then one in three, up to the longest [d].
@@ -182,7 +184,7 @@ class Alarm:
     log_evidence : float
         Logarithm of the e-detector [-].
     starts : ndarray of int, shape (n_sought + n_end,)
-        Likeliest day since when, of each change and, after these, of each end.
+        Day since when, of each change and, after these, of each end: the median by its likelihood.
     share : ndarray, shape (n_sought,)
         Probability of each change, given that there is one [-].
     ends : ndarray, shape (n_end,)
@@ -202,8 +204,8 @@ class Watch:
     ----------
     what : Sought
         What may change.
-    n_state : int
-        States of the filter.
+    state : State
+        Of the filter: says how much of what cannot be less than nothing there is to lose.
     cap : float
         Most that a single day may add to the logarithm of the evidence of a change [-].
     dispersion : Dispersion
@@ -215,7 +217,7 @@ class Watch:
     def __init__(
         self,
         what: Sought,
-        n_state: int,
+        state: State,
         dispersion: Dispersion,
         cap: float = np.inf,
         ends: Sequence[tuple[int, float]] = (),
@@ -223,11 +225,14 @@ class Watch:
         self.what, self.cap, self.dispersion, self.ends = what, cap, dispersion, list(ends)
         self.starts = np.zeros(0, dtype=np.int64)
         k = what.which.size
-        self._moved = np.zeros((n_state, 0, k))
+        self._moved = np.zeros((state.mean.size, 0, k))
         self._score, self._information = np.zeros((0, k)), np.zeros((0, k))
         self._top = np.zeros((0, k + len(self.ends)))
         self._deviation = np.array([what.columns[i].deviation for i in what.which])
-        self._grows = np.array([what.columns[i].from_zero for i in what.which], dtype=bool)
+        least = np.array([what.columns[i].least for i in what.which])
+        self._bounded, absent = np.isfinite(least), least == 0.0
+        self._room = np.where(self._bounded & ~absent, np.maximum(0.0, state.mean[what.which] - least), 0.0)
+        self._unsure = np.where(absent, 0.0, np.diag(state.covariance)[what.which])
         self.log_ratio = np.zeros((0, k + len(self.ends)))
 
     def take(self, day: int, days: Days, innovation: Innovation, noticed: int | None = None) -> Alarm:
@@ -301,9 +306,10 @@ class Watch:
             spread = size * self._deviation[at]
             sharp = information + spread**-2.0
             ratio = 0.5 * score**2 / sharp - 0.5 * np.log1p(information * spread**2)
-            # half of the normal distribution where a strength can only grow
-            ratio = ratio + np.where(self._grows[at], np.log(2.0) + log_ndtr(score / np.sqrt(sharp)), 0.0)
-            parts.append(ratio)
+            # what is left of the distribution where a strength cannot be less than 0
+            after = log_ndtr((score / sharp + self._room[at]) / np.sqrt(1.0 / sharp + self._unsure[at]))
+            before = log_ndtr(self._room[at] / np.sqrt(spread**2 + self._unsure[at]))
+            parts.append(ratio + np.where(self._bounded[at], after - before, 0.0))
         begun = logsumexp(np.array(parts), axis=0) - np.log(len(parts))
         lost = np.concatenate([np.zeros(k), [size for _, size in self.ends]])[which]
         return np.asarray(np.where(which < k, begun, -lost * score - 0.5 * lost**2 * information))
@@ -329,5 +335,13 @@ class Watch:
         beside = logsumexp(self._ratios(np.full_like(which, likeliest), pair), axis=0)
         named = self._ratios(which, pair) - beside + weight
         probability = np.exp(logsumexp(named, axis=0) - logsumexp(named))
-        starts = self.starts[np.argmax(named, axis=0)]
-        return Alarm(float(logsumexp(told)), starts, probability[:k], probability[k:])
+        return Alarm(float(logsumexp(told)), self._dated(named), probability[:k], probability[k:])
+
+    def _dated(self, ratios: FloatArray) -> IntArray:
+        """Median of the days since when each may have changed: many are as likely where nothing asked for what changed.
+
+        A day counts for all up to the next that is sought.
+        """
+        days = np.diff(self.starts, append=self.starts[-1] + 1)[:, None]
+        share = np.cumsum(days * np.exp(ratios - ratios.max(axis=0)), axis=0)
+        return np.asarray(self.starts[np.argmax(share >= 0.5 * share[-1], axis=0)])

@@ -20,7 +20,7 @@ N_ERROR, REFERENCE = 6, 30
 
 def column(name: str, effect: str | None, changes: bool, zones: tuple[str, ...] = ()) -> Column:
     """Make a column whose prior is one unit wide."""
-    return Column(name, "1", effect, zones, 1.0, 0.3, 0.0, 0.0, changes, False)
+    return Column(name, "1", effect, zones, 1.0, 0.3, 0.0, 0.0, changes, -np.inf)
 
 
 def made(seed: int, n_day: int, shift: float = 0.0, start: int = 0, end: int = 10**6, over: int = 0) -> Days:
@@ -47,7 +47,7 @@ def first_alarms(threshold: float, seeds: range, n_day: int) -> list[float]:
         days = made(seed, n_day)
         filtered, what = DayFilter(days, 0.25 * np.eye(N_ERROR)), sought(days)
         state, dispersion = filtered.start(), Dispersion(n_day, what.which.size)
-        watch, first = Watch(what, state.mean.size, dispersion), np.inf
+        watch, first = Watch(what, state, dispersion), np.inf
         for day in range(n_day):
             state, innovation = filtered.step(state, day)
             assert innovation is not None
@@ -97,7 +97,7 @@ def test_information_of_a_new_change_is_that_of_least_squares() -> None:
     days = made(3, 5)
     filtered, what = DayFilter(days, 0.25 * np.eye(N_ERROR)), sought(days)
     state = filtered.start()
-    watch = Watch(what, state.mean.size, Dispersion(5, what.which.size))
+    watch = Watch(what, state, Dispersion(5, what.which.size))
     for day in range(4):
         state, innovation = filtered.step(state, day)
         assert innovation is not None
@@ -109,6 +109,29 @@ def test_information_of_a_new_change_is_that_of_least_squares() -> None:
     assert watch._score[-1] == pytest.approx(expected.T @ innovation.left)
 
 
+def test_a_strength_cannot_become_less_than_nothing() -> None:
+    """The ratio is the mean likelihood over changes that leave something, by quadrature over strength and change."""
+    days = made(6, 8, -1.0, start=4)
+    own = tuple(replace(c, least=-0.4 if c.may_change else -np.inf) for c in days.columns)
+    days = replace(days, columns=own)
+    filtered, what = DayFilter(days, 0.25 * np.eye(N_ERROR)), sought(days)
+    state = filtered.start()
+    watch = Watch(what, state, Dispersion(len(days), what.which.size))
+    for day in range(len(days)):
+        state, innovation = filtered.step(state, day)
+        assert innovation is not None
+        watch.take(day, days, innovation)
+    score, information = watch._score[4, 0], watch._information[4, 0]
+    p, v = np.meshgrid(np.linspace(-6.0, 6.0, 1201), np.linspace(-2.0, 2.8, 1201))
+    strength = np.exp(-0.5 * ((v - 0.4) / 0.3) ** 2)  # by the filter before its first day
+    means = []
+    for size in (1.0, 0.3, 0.1, 0.03):
+        prior = np.where(v + p > 0.0, strength * np.exp(-0.5 * (p / size) ** 2), 0.0)
+        means.append(np.sum(prior * np.exp(p * score - 0.5 * p**2 * information)) / prior.sum())
+    assert score < 0.0
+    assert watch._ratios(np.array([0]), np.ones(1))[4, 0] == pytest.approx(np.log(np.mean(means)), abs=0.02)
+
+
 def test_starts_stay_while_an_alarm_waits_for_its_name() -> None:
     """A change three weeks before its alarm would otherwise be forgotten before it is named."""
     days = made(0, 40)
@@ -117,7 +140,7 @@ def test_starts_stay_while_an_alarm_waits_for_its_name() -> None:
     for waits in (False, True):
         tracked = DayFilter(days, noise)
         state = tracked.start()
-        watch = Watch(what, state.mean.size, Dispersion(40, what.which.size))
+        watch = Watch(what, state, Dispersion(40, what.which.size))
         for day in range(30):
             state, innovation = tracked.step(tracked.grown(state), day)
             assert innovation is not None
@@ -183,6 +206,24 @@ def test_quiet_days_are_quiet() -> None:
     assert course.withdrawn == ()
     assert np.isfinite(course.evidence[REFERENCE:]).all()
     assert np.isnan(course.evidence[:REFERENCE]).all()
+
+
+def test_a_few_days_unlike_others_are_withdrawn() -> None:
+    course = follow(made(3, 120, 1.0, start=60, end=66), REFERENCE)
+    assert course.events == ()
+    assert course.withdrawn == (63,)
+
+
+def test_an_alarm_waits_while_its_evidence_is_neither_enough_nor_gone() -> None:
+    """Four days that say the opposite put the name off, and do not withdraw the alarm."""
+    days = made(3, 120, 1.0, start=60)
+    opposite = slice(66, 70)
+    days.errors[opposite] = 2.0 * made(3, 120).errors[opposite] - days.errors[opposite]
+    course = follow(days, REFERENCE)
+    event = course.events[0]
+    assert (event.effect, event.alarm) == ("valve_leak", 63)
+    assert event.named > 63 + NAMING_DAYS
+    assert course.withdrawn == ()
 
 
 def test_a_single_day_raises_no_alarm() -> None:
@@ -251,7 +292,7 @@ def test_names_are_told_apart_by_one_noise() -> None:
     days.slopes[:, :, 1] = days.slopes[:, :, 0]
     filtered, what = DayFilter(days, 0.25 * np.eye(N_ERROR)), sought(days)
     state = filtered.start()
-    watch = Watch(what, state.mean.size, Uneven(len(days), what.which.size))
+    watch = Watch(what, state, Uneven(len(days), what.which.size))
     for day in range(len(days)):
         state, innovation = filtered.step(state, day)
         assert innovation is not None
