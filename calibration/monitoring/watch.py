@@ -8,9 +8,10 @@ of the change so far is in its states (Willsky and Jones 1976, doi:10.1109/TAC.1
 With p ~ N(0, σ²) before the data the likelihood ratio has the mean ``E = (1 + σ² I)^-½ exp(½ S² / (I + σ^-2))``, whose
 expectation is 1 while nothing changes. Where the strength v ~ N(u, s²) cannot become less than 0, both normal
 distributions end where v + p does, and with the mean m and the variance q of p by the data E takes the factor
-``Φ((m + u) / (q + s²)^½) / Φ(u / (σ² + s²)^½)``. The sum of the ratios over all τ, weighted over all that may change, is the
-e-detector of Shiryaev and Roberts, and an alarm where it exceeds A comes on average after A days or more while nothing
-has changed (Shin, Ramdas and Rinaldo 2024, doi:10.51387/23-NEJSDS51), whatever the number of changes that are sought.
+``Φ((m + u) / (q + s²)^½) / Φ(u / (σ² + s²)^½)``. The sum of the ratios over all τ, weighted over all that may change,
+is the e-detector of Shiryaev and Roberts, and an alarm where it exceeds A comes on average after A days or more while
+nothing has changed (Shin, Ramdas and Rinaldo 2024, doi:10.51387/23-NEJSDS51), whatever the number of changes that are
+sought.
 """
 
 from __future__ import annotations
