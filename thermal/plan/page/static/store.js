@@ -23,7 +23,7 @@ export const page = {
 };
 
 const past = [], future = [], listeners = [];
-let timer = null, running = null, dirty = false, seconds = 0, lastSign = Date.now(), lastTick = Date.now();
+let timer = null, running = null, dirty = false, unanswered = false, seconds = 0, lastSign = Date.now(), lastTick = Date.now();
 
 export const listen = (listener) => listeners.push(listener);
 export const tell = (what) => listeners.forEach((listener) => listener(what));
@@ -164,12 +164,20 @@ export async function save() {
   if (dirty && page.saved !== "trouble") await save();
 }
 
+// A save whose answer was cut off may have come: where this window has saved last, what the server has is its own.
+async function catchUp() {
+  const there = await api.get("api/state");
+  if (there.saved_by === api.windowName) page.draft = { ...page.draft, revision: there.draft.revision };
+  unanswered = false;
+}
+
 async function push() {
-  const sent = page.draft, spent = seconds;
   page.saved = "saving";
   tell("saved");
-  dirty = false;
   try {
+    if (unanswered) await catchUp();
+    const sent = page.draft, spent = seconds;
+    dirty = false;
     const answer = await api.send("api/draft", encode(sent), { method: "PUT" });
     page.draft = { ...page.draft, revision: answer.revision, seconds: page.draft.seconds + spent };
     seconds -= spent;
@@ -180,6 +188,7 @@ async function push() {
     tell("verdict");
   } catch (error) {
     dirty = true;
+    unanswered ||= error.status === 0;
     page.saved = "trouble";
     if (error.status === 409) lose(error.message);
     else { tell({ trouble: error }); clearTimeout(timer); timer = setTimeout(save, 3000); }
