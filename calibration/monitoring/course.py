@@ -100,8 +100,10 @@ class Course:
         In the order in which they were noticed.
     withdrawn : tuple of int
         Days of alarms whose evidence was gone a week later, or not enough for three weeks.
+    waiting : int or None
+        Day of an alarm that waits for its name where the telemetry ends; None where none does.
     evidence : ndarray, shape (n_day,)
-        Logarithm of the evidence that something has changed [-]; NaN while nothing is watched.
+        Logarithm of the evidence that something has changed [-]; NaN while nothing is watched or an alarm waits.
     size : ndarray, shape (n_day,)
         Mean square of the day's innovations over what is expected [-]; NaN where nothing was measured.
     carried : ndarray, shape (n_day,)
@@ -116,6 +118,7 @@ class Course:
 
     events: tuple[Event, ...]
     withdrawn: tuple[int, ...]
+    waiting: int | None
     evidence: FloatArray
     size: FloatArray
     carried: FloatArray
@@ -219,8 +222,10 @@ class _Walk:
             ends = [(place, size) for place, size in zip(self.places, self._sizes(state), strict=True)]
             self.lasting = [k for k, e in enumerate(self.events) if e.end is None]
             cap = self.threshold / 2.0  # no single day may raise an alarm
-            self.watch = Watch(self.what, state, self.dispersion, cap, [ends[k] for k in self.lasting])
-        alarm = self.watch.take(day, self.days, innovation, self.pending)
+            found, n_state = self.filter.changes, state.mean.size
+            lasting = [ends[k] for k in self.lasting]
+            self.watch = Watch(self.what, n_state, self.dispersion, cap, lasting, found)
+        alarm = self.watch.take(day, self.days, innovation, (state, ahead), self.pending)
         if self.pending is None:
             self.evidence[day] = alarm.log_evidence
             if alarm.log_evidence > self.threshold:
@@ -245,8 +250,7 @@ class _Walk:
         if day - noticed < NAMING_DAYS and day + 1 < len(self.days):
             return
         if alarm.log_evidence < self.threshold:  # a few days unlike others look like a change and do not last
-            last = day - noticed >= _LONGEST_WAIT or day + 1 == len(self.days)
-            if last or alarm.log_evidence < _GONE * self.threshold:
+            if alarm.log_evidence < _GONE * self.threshold or day - noticed >= _LONGEST_WAIT:
                 self.withdrawn.append(noticed)
                 self.pending = None
             return
@@ -309,7 +313,7 @@ class _Walk:
             for k, c in enumerate(columns) if c.spread > 0.0 and not c.is_unknown
         }  # fmt: skip
         return Course(
-            tuple(events), tuple(self.withdrawn), self.evidence, self.size, self.carried, self.threshold, parameters,
-            told,
+            tuple(events), tuple(self.withdrawn), self.pending, self.evidence, self.size, self.carried, self.threshold,
+            parameters, told,
         )  # fmt: skip
 

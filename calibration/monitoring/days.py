@@ -85,9 +85,10 @@ class Column:
         Where the model is [parameter unit].
     may_change : bool
         Whether it may change from one day to the next.
-    least : float
-        Change that takes it to 0 where it cannot be less, as a leak cannot: 0 for what is absent, minus infinity where
-        there is no such end [estimation scale].
+    present : bool
+        Whether the model has it, or the effect that it belongs to.
+    is_positive : bool
+        Whether it is the strength of something that cannot be less than nothing, as a leak.
     """
 
     name: str
@@ -99,7 +100,8 @@ class Column:
     away: float
     value: float
     may_change: bool
-    least: float
+    present: bool
+    is_positive: bool
 
     @property
     def is_unknown(self) -> bool:
@@ -151,7 +153,7 @@ def days_of_case(
     effects: Mapping[str, Sequence[str]],
     values: Mapping[str, float],
     candidates: Sequence[str],
-    moved: Sequence[ModelComparison] = (),
+    moved: Mapping[float, ModelComparison] | None = None,
     progress: Progress | None = None,
 ) -> Days:
     """Run the model over all the telemetry, with the sensitivities to all that may be or change.
@@ -166,8 +168,8 @@ def days_of_case(
         Its parameters by name [parameter units].
     candidates : sequence of str
         Effects that it lacks, and that the case can tell.
-    moved : sequence of ModelComparison
-        The case with its weather an hour too early and too late, which say what a wrong clock does; none where the
+    moved : mapping of float to ModelComparison, optional
+        The case with its weather said so much later [h], twice, which says what a wrong clock does; none where the
         weather's clock is not watched.
     progress : callable, optional
         Called with stage, done, total.
@@ -179,7 +181,8 @@ def days_of_case(
     """
     built = models.build({**effects, **{e: () for e in candidates if e not in effects}})
     theta = built.theta(values)
-    replay = _Replay(models, built, theta, [replay_inputs(m.case, built.network, m.drivers) for m in moved])
+    clocks = {hours: replay_inputs(m.case, built.network, m.drivers) for hours, m in (moved or {}).items()}
+    replay = _Replay(models, built, theta, clocks)
     own, dates = built.network.parameters, replay.dates
     by = [*range(len(theta)), *replay.further]
     errors, slopes = np.full((len(dates), *replay.shape), np.nan), np.zeros((len(dates), *replay.shape, len(by)))
@@ -198,7 +201,7 @@ def days_of_case(
     by_day, at_onset = slopes.reshape(len(dates), n_error, -1), onset.reshape(ONSET, n_error, -1)
     columns = [_column(own[i], theta[i], own[i].effect in effects or own[i].effect is None) for i in by]
     # a further secant is no further strength
-    columns[len(theta) :] = [replace(c, spread=0.0) for c in columns[len(theta) :]]
+    columns[len(theta) :] = [replace(c, spread=0.0, away=0.0) for c in columns[len(theta) :]]
     told = np.abs(by_day).max(axis=(0, 1)) > 0.0
     return Days(
         dates, errors.reshape(len(dates), -1), by_day[..., told],
@@ -243,7 +246,9 @@ def coming(over: int, onset: FloatArray) -> tuple[FloatArray, FloatArray]:
 class _Replay:
     """Runs of the model from midnight to midnight, half way and at their end."""
 
-    def __init__(self, models: ModelComparison, built: Built, theta: FloatArray, moved: Sequence[Inputs]) -> None:
+    def __init__(
+        self, models: ModelComparison, built: Built, theta: FloatArray, moved: Mapping[float, Inputs]
+    ) -> None:
         self.built, self.theta, self.spin_up = built, theta, models.settings.spin_up_seconds
         self.moved = moved
         # a basis of this θ alone interpolates tangents too, as in a screening
@@ -276,15 +281,22 @@ class _Replay:
         further = []
         for i, p in enumerate(self.built.network.parameters):
             if at := _SECANTS.get(p.base, ()):
-                there = [self.theta + (np.arange(self.theta.size) == i) * a for a in at]
-                first, *others = (np.nan_to_num(self._run(part, t, self.built.inputs)[0] - errors) for t in there)
-                slopes[..., i] = first / at[0]
-                further += [other / a for other, a in zip(others, at[1:], strict=True)]
+                slopes[..., i], *others = (self._secant(part, errors, i, step) for step in at)
+                further += others
             elif p.base == _CLOCK and self.moved:
-                earlier, later = (self._run(part, self.theta, inputs)[0] for inputs in self.moved)
-                slopes[..., i] = np.nan_to_num(later - earlier) / 2.0
+                hours = sorted(self.moved)
+                earlier, later = (self._run(part, self.theta, self.moved[h])[0] for h in hours)
+                slopes[..., i] = np.nan_to_num(later - earlier) / (hours[1] - hours[0])
         scale = np.append(self.scale, self.scale[self.further])
         return errors, np.stack([*np.moveaxis(slopes, -1, 0), *further], axis=-1) * scale
+
+    def _secant(self, part: slice, errors: FloatArray, number: int, step: float) -> FloatArray:
+        """Secant of the errors over a step of a parameter, within its range: upwards, or downwards from its end."""
+        own = self.built.network.parameters[number]
+        room = own.upper - self.theta[number]
+        taken = min(step, room) if room > 0.5 * step else -min(step, self.theta[number] - own.lower)
+        there = self.theta + (np.arange(self.theta.size) == number) * taken
+        return np.asarray(np.nan_to_num(self._run(part, there, self.built.inputs)[0] - errors) / taken)
 
     def onset_of_bias(self, zone: int, errors: FloatArray, slopes: FloatArray) -> FloatArray:
         """First days of a sensor that begins to read 1 K more, (n_onset, n_run, n_kept, n_zone) [K], less later ones.
@@ -345,5 +357,5 @@ def _column(p: Parameter, value: float, present: bool) -> Column:
     return Column(
         p.name, p.unit, p.effect, zones, p.prior_deviation, p.prior_deviation * (1.0 if present else _SELDOM),
         p.transform(p.start) - p.transform(value), float(value),
-        may_change=changes, least=-float(value) if changes and p.lower == 0.0 else -np.inf,
+        may_change=changes, present=present, is_positive=changes and p.lower == 0.0,
     )  # fmt: skip

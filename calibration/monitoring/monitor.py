@@ -143,6 +143,7 @@ class Monitoring(Result):
         content: dict[str, Any] = plain({
             "events": [self._event(e) for e in self.events],
             "withdrawn": [self.date(day) for day in course.withdrawn],
+            "waiting": None if course.waiting is None else self.date(course.waiting),
             "watched": {"from": self.date(self.settings.reference_days), "to": self.days.dates[-1],
                         "days": int(self.is_watched.sum()), "days_without_a_run": int((~self.is_watched).sum()),
                         "silent_zones": self.silent_zones},
@@ -244,7 +245,8 @@ def monitor(
     # what is in the model is watched like all else
     untestable = {e: why for e, why in untestable.items() if e not in effects or e in chosen.ruled_out}
     candidates = [e for e in CATALOGUE if e not in untestable and not (set(CATALOGUE[e].requires) - set(effects))]
-    moved = [_moved(models, hours) for hours in (-1.0, 1.0)]
+    hour = max(1, round(3600.0 / case.step)) * case.step / 3600.0  # whole steps
+    moved = {h: _moved(models, h) for h in (-hour, hour)} if "clock_shift" in {*effects, *candidates} else None
     days = days_of_case(models, effects, values, [*candidates, *NO_CAUSE], moved, progress)
     course = follow(days, chosen.reference_days, chosen.ruled_out, progress)
     watched = {e: r for e, r in untestable.items() if e in MAY_CHANGE}
@@ -275,7 +277,8 @@ def _of_seasons(case: Case, normalisation: Normalisation) -> InputProvider:
 
 def _largest_heat(case: Case) -> FloatArray:
     """Largest heat that terminals were seen to give before each day, shape (n_time, n_zone) [W]: cooling in spring."""
-    within = case.zone_heat().abs().rolling(f"{_PEAKS}D", min_periods=1).quantile(0.99)
+    enough = round(0.5 * _PEAKS * 86400.0 / case.step)
+    within = case.zone_heat().abs().rolling(f"{_PEAKS}D", min_periods=enough).quantile(0.99)
     by_day = within.groupby(case.stamps.normalize()).last().cummax().ffill().shift()
     return np.asarray(by_day.fillna(0.0).reindex(case.stamps.normalize()))
 

@@ -6,12 +6,15 @@ of the change so far is in its states (Willsky and Jones 1976, doi:10.1109/TAC.1
     G_d = J_d - H_d F_d,   F_d+1 = F_d + K_d G_d,   S = Σ Gᵀ V⁻¹ ν,   I = Σ Gᵀ V⁻¹ G                             (M2)
 
 With p ~ N(0, σ²) before the data the likelihood ratio has the mean ``E = (1 + σ² I)^-½ exp(½ S² / (I + σ^-2))``, whose
-expectation is 1 while nothing changes. Where the strength v ~ N(u, s²) cannot become less than 0, both normal
-distributions end where v + p does, and with the mean m and the variance q of p by the data E takes the factor
-``Φ((m + u) / (q + s²)^½) / Φ(u / (σ² + s²)^½)``. The sum of the ratios over all τ, weighted over all that may change,
-is the e-detector of Shiryaev and Roberts, and an alarm where it exceeds A comes on average after A days or more while
-nothing has changed (Shin, Ramdas and Rinaldo 2024, doi:10.51387/23-NEJSDS51), whatever the number of changes that are
-sought.
+expectation is 1 while nothing changes. A strength v that is positive stays so: where v + p cannot be less than 0, E
+takes the factor ``P(v + p > 0 | data) / P(v + p > 0)``, before the data by v ~ N(u, s²) as the filter has it on day τ,
+after them by its estimate v̂ with the variance P and what it has made of the change, F, with mean m and variance q of p,
+
+    Φ((v̂ + (1 - F) m) / (P + (1 - F)² q)^½) / Φ(u / (σ² + s²)^½)                                               (M4)
+
+The sum of the ratios over all τ, weighted over all that may change, is the e-detector of Shiryaev and Roberts, and an
+alarm where it exceeds A comes on average after A days or more while nothing has changed (Shin, Ramdas and Rinaldo 2024,
+doi:10.51387/23-NEJSDS51), whatever the number of changes that are sought.
 """
 
 from __future__ import annotations
@@ -24,8 +27,8 @@ from scipy.linalg import solve_triangular
 from scipy.special import log_ndtr, logsumexp
 
 from calibration.monitoring.days import NO_CAUSE, Column, Days, coming
-from calibration.monitoring.filter import Innovation, State
-from thermal._types import FloatArray, IntArray
+from calibration.monitoring.filter import Found, Innovation, State
+from thermal._types import BoolArray, FloatArray, IntArray
 
 #: Days since when a change is sought: each of the last ones, then one in three, up to the longest [d].
 _EACH, _THIRD, _LONGEST = 14, 3, 21
@@ -205,38 +208,43 @@ class Watch:
     ----------
     what : Sought
         What may change.
-    state : State
-        Of the filter: says how much of what cannot be less than nothing there is to lose.
+    n_state : int
+        States of the filter, the changes that were found last.
     cap : float
         Most that a single day may add to the logarithm of the evidence of a change [-].
     dispersion : Dispersion
         What scores and information are divided by.
     ends : sequence of (int, float)
         Changes that were found, by their place among what is sought, with their sizes [estimation scale].
+    found : sequence of Found
+        All changes that were found.
     """
 
     def __init__(
         self,
         what: Sought,
-        state: State,
+        n_state: int,
         dispersion: Dispersion,
         cap: float = np.inf,
         ends: Sequence[tuple[int, float]] = (),
+        found: Sequence[Found] = (),
     ) -> None:
         self.what, self.cap, self.dispersion, self.ends = what, cap, dispersion, list(ends)
         self.starts = np.zeros(0, dtype=np.int64)
         k = what.which.size
-        self._moved = np.zeros((state.mean.size, 0, k))
+        self._moved = np.zeros((n_state, 0, k))
         self._score, self._information = np.zeros((0, k)), np.zeros((0, k))
         self._top = np.zeros((0, k + len(self.ends)))
         self._deviation = np.array([what.columns[i].deviation for i in what.which])
-        least = np.array([what.columns[i].least for i in what.which])
-        self._bounded, absent = np.isfinite(least), least == 0.0
-        self._room = np.where(self._bounded & ~absent, np.maximum(0.0, state.mean[what.which] - least), 0.0)
-        self._unsure = np.where(absent, 0.0, np.diag(state.covariance)[what.which])
+        self._bounded = np.array([what.columns[i].is_positive for i in what.which], dtype=bool)
+        self._parts = [self._parts_of(i, n_state, found) for i in what.which]
+        self._room, self._unsure, self._kept = np.zeros((0, k)), np.zeros((0, k)), np.ones((0, k))
+        self._left = np.zeros(k), np.zeros(k)
         self.log_ratio = np.zeros((0, k + len(self.ends)))
 
-    def take(self, day: int, days: Days, innovation: Innovation, noticed: int | None = None) -> Alarm:
+    def take(
+        self, day: int, days: Days, innovation: Innovation, states: tuple[State, State], noticed: int | None = None
+    ) -> Alarm:
         """Take in a day.
 
         Parameters
@@ -247,10 +255,12 @@ class Watch:
             With the derivatives of its errors.
         innovation : Innovation
             Of the filter.
+        states : tuple of State
+            Of the filter before the day and after it.
         noticed : int, optional
-            Day of an alarm that waits for its name: starts that were sought then are kept.
+            Day of an alarm that waits for its name: starts that were sought then are kept, and name it.
         """
-        self._renew(day, day if noticed is None else noticed)
+        self._renew(day, day if noticed is None else noticed, states[0])
         n, t, k = self._moved.shape
         own = self.what.shown(days, day, innovation)
         self.dispersion.put(day, own, innovation)
@@ -263,12 +273,15 @@ class Watch:
         white = solve_triangular(innovation.root, flat, lower=True)
         self._score += (innovation.white @ white).reshape(t, k)
         self._information += (white**2).sum(axis=0).reshape(t, k)
+        self._left = self._strengths(states[1])
+        for i in np.flatnonzero(self._bounded):
+            self._kept[:, i] = 1.0 - self._moved[self._parts[i], :, i].sum(axis=0)
         before = self.log_ratio
         which = np.arange(self.log_ratio.shape[1])
         varies = self.dispersion.at(day)[self._place(which)]
         self.log_ratio = self._ratios(which, varies)
         self._top = np.maximum(self._top, self.log_ratio - before)
-        return self._judge(varies)
+        return self._judge(varies, self.starts <= (day if noticed is None else noticed))
 
     def size(self, start: int, number: int) -> float:
         """Likeliest size of a change since a day [estimation scale].
@@ -284,16 +297,34 @@ class Watch:
         sharp = self._information[row, number] + self._deviation[number] ** -2.0
         return float(self._score[row, number] / sharp)
 
-    def _renew(self, day: int, by: int) -> None:
+    def _parts_of(self, number: int, n_state: int, found: Sequence[Found]) -> IntArray:
+        """States that make up a strength: its own where the model has it, and the changes of it that last."""
+        columns, first = self.what.columns, n_state - len(found)
+        same = [k for k, c in enumerate(columns) if c.name == columns[number].name]
+        own = [k for k in same if columns[k].present]
+        return np.array(own + [first + k for k, c in enumerate(found) if c.column in same and c.end is None], dtype=int)
+
+    def _strengths(self, state: State) -> tuple[FloatArray, FloatArray]:
+        """Mean and variance of the strengths that cannot be less than 0, by the filter; 0 of what is absent."""
+        mean, variance = np.zeros(len(self._parts)), np.zeros(len(self._parts))
+        for i in np.flatnonzero(self._bounded):
+            column, parts = self.what.columns[self.what.which[i]], self._parts[i]
+            mean[i] = column.value * column.present + state.mean[parts].sum()
+            variance[i] = state.covariance[np.ix_(parts, parts)].sum()
+        return mean, np.maximum(variance, 0.0)
+
+    def _renew(self, day: int, by: int, state: State) -> None:
         """Let go of starts that are too long ago by some day, and begin a new one."""
         age = by - self.starts
         kept = (age < _EACH) | ((self.starts % _THIRD == 0) & (age < _LONGEST))
         self.starts = np.append(self.starts[kept], day)
         new = np.zeros((self._moved.shape[0], 1, self._moved.shape[2]))
         self._moved = np.concatenate([self._moved[:, kept], new], axis=1)
-        for name in ("_score", "_information", "_top", "log_ratio"):
+        room, unsure = self._strengths(state)
+        begun = {"_room": room, "_unsure": unsure, "_kept": np.ones_like(room)}
+        for name in ("_score", "_information", "_top", "log_ratio", "_room", "_unsure", "_kept"):
             held = getattr(self, name)
-            setattr(self, name, np.vstack([held[kept], np.zeros((1, held.shape[1]))]))
+            setattr(self, name, np.vstack([held[kept], begun.get(name, np.zeros(held.shape[1]))]))
 
     def _ratios(self, which: IntArray, varies: FloatArray) -> FloatArray:
         """Logarithms of the likelihood ratios by start, of changes and, after them, ends of those that were found.
@@ -307,9 +338,9 @@ class Watch:
             spread = size * self._deviation[at]
             sharp = information + spread**-2.0
             ratio = 0.5 * score**2 / sharp - 0.5 * np.log1p(information * spread**2)
-            # what is left of the distribution where a strength cannot be less than 0
-            after = log_ndtr((score / sharp + self._room[at]) / np.sqrt(1.0 / sharp + self._unsure[at]))
-            before = log_ndtr(self._room[at] / np.sqrt(spread**2 + self._unsure[at]))
+            kept, (left, unsure) = self._kept[:, at], self._left
+            after = log_ndtr((left[at] + kept * score / sharp) / np.sqrt(unsure[at] + kept**2 / sharp))
+            before = log_ndtr(self._room[:, at] / np.sqrt(spread**2 + self._unsure[:, at]))
             parts.append(ratio + np.where(self._bounded[at], after - before, 0.0))
         begun = logsumexp(np.array(parts), axis=0) - np.log(len(parts))
         lost = np.concatenate([np.zeros(k), [size for _, size in self.ends]])[which]
@@ -319,30 +350,47 @@ class Watch:
         """Place among what is sought of changes and ends."""
         return np.array([*range(self.what.which.size), *(i for i, _ in self.ends)], dtype=np.int64)[which]
 
-    def _judge(self, varies: FloatArray) -> Alarm:
-        """Weigh all changes and starts.
+    def _judge(self, varies: FloatArray, begun: BoolArray) -> Alarm:
+        """Weigh all changes and starts that there were when an alarm was raised.
 
         Names are told apart in pairs with the likeliest change, each pair by one noise, the larger of the two: a
-        change whose direction varies a little more from day to day is no less likely to be the name.
+        change whose direction varies a little more from day to day is no less likely to be the name. What is no
+        likelier than nothing by its own noise is no name, though a large noise makes all alike.
         """
         share = _ENDS if self.ends else 0.0
         ends = np.full(len(self.ends), share / max(1, len(self.ends)))
         with np.errstate(divide="ignore"):
             weight = np.log(np.concatenate([(1.0 - share) * self.what.weight, ends]))
-        told = self.log_ratio - np.maximum(0.0, self._top - self.cap) + weight
+        told = (self.log_ratio - np.maximum(0.0, self._top - self.cap) + weight)[begun]
         likeliest = np.argmax(logsumexp(told, axis=0))
         which, k = np.arange(weight.size), self.what.which.size
         pair = np.maximum(varies, varies[likeliest])
-        beside = logsumexp(self._ratios(np.full_like(which, likeliest), pair), axis=0)
-        named = self._ratios(which, pair) - beside + weight
+        beside = logsumexp(self._ratios(np.full_like(which, likeliest), pair)[begun], axis=0)
+        shows = np.log(-np.expm1(-np.maximum(1e-12, self.log_ratio[begun].max(axis=0))))
+        named = self._ratios(which, pair)[begun] - beside + weight + shows
         probability = np.exp(logsumexp(named, axis=0) - logsumexp(named))
-        return Alarm(float(logsumexp(told)), self._dated(named), probability[:k], probability[k:])
+        starts = dated(self.starts[begun], self._ratios(which, pair)[begun])
+        return Alarm(float(logsumexp(told)), starts, probability[:k], probability[k:])
 
-    def _dated(self, ratios: FloatArray) -> IntArray:
-        """Median of the days since when each may have changed: many are as likely where nothing asked for what changed.
 
-        A day counts for all up to the next that is sought.
-        """
-        days = np.diff(self.starts, append=self.starts[-1] + 1)[:, None]
-        share = np.cumsum(days * np.exp(ratios - ratios.max(axis=0)), axis=0)
-        return np.asarray(self.starts[np.argmax(share >= 0.5 * share[-1], axis=0)])
+def dated(starts: IntArray, ratios: FloatArray) -> IntArray:
+    """Find the medians of the days since when changes may be there, by their likelihood, shape (n,).
+
+    Where nothing asked for what has changed, many days are as likely, and the likeliest is chance.
+
+    Parameters
+    ----------
+    starts : ndarray of int, shape (n_start,)
+        Days that are sought, in order; each counts for those after the one before it, on which nothing was measured or
+        which are not sought.
+    ratios : ndarray, shape (n_start, n)
+        Logarithms of the likelihood ratios of each change since these days [-].
+
+    Examples
+    --------
+    >>> dated(np.array([3, 6, 7, 8, 9]), np.array([[0.0, 0.0], [0.0, 0.0], [0.0, 9.0], [0.0, 0.0], [-9.0, 0.0]]))
+    array([6, 7])
+    """
+    days = np.diff(starts, prepend=starts[0] - 1)[:, None]
+    share = np.cumsum(days * np.exp(ratios - ratios.max(axis=0)), axis=0)
+    return np.asarray(starts[np.argmax(share >= 0.5 * share[-1], axis=0)])

@@ -122,6 +122,8 @@ def monitoring_means(found: Monitoring) -> Means:
     trust = f"{watched} were watched against the first {found.settings.reference_days}, which are taken for sound."
     if found.course.withdrawn:
         trust += f" {counted(len(found.course.withdrawn), 'alarm')} proved to be a few unusual days."
+    if found.course.waiting is not None:
+        trust += f" An alarm of {found.date(found.course.waiting):%-d %B} is not decided yet."
     if not found.events:
         return Means("The building behaves as it did.", trust, "Nothing to do; run it again in a week.")
     shown = lasting[-1] if lasting else found.events[-1]

@@ -75,6 +75,8 @@ def monitoring_verdict(found: Monitoring) -> str:
     without = f" {counted(missed, 'day')} more had no usable run." if missed else ""
     if found.silent_zones:
         without += f" Too little was measured {in_zones(list(found.silent_zones))} on the reference days."
+    if found.course.waiting is not None:
+        without += f" An alarm of {found.date(found.course.waiting):%-d %B %Y} waits for more days."
     if not found.events:
         return f"Nothing has changed in {watched} that were watched.{without}"
     told = [f"{_what(e)} ({in_zones(e.zones)}), {_when(found, e)}" for e in found.events[-_MOST:]]

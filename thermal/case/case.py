@@ -162,7 +162,7 @@ class Case:
         Parameters
         ----------
         hours
-            By how much later it is said [h], rounded to a step at least; negative for earlier.
+            By how much later it is said [h], rounded to whole steps; negative for earlier.
 
         Returns
         -------
@@ -170,7 +170,7 @@ class Case:
             With the same stamps; what comes in at an end is the value there.
         """
         frame = self.telemetry.frame.copy()
-        steps = round(hours * 3600.0 / self.step) or (1 if hours > 0.0 else -1)
+        steps = round(hours * 3600.0 / self.step)
         columns = [str(c) for c in frame if str(c).startswith(f"{self.building.weather_station}/")]
         rows = np.clip(np.arange(len(frame)) - steps, 0, len(frame) - 1)
         frame[columns] = frame[columns].to_numpy()[rows]

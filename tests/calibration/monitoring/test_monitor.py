@@ -132,23 +132,34 @@ def test_terminals_show_what_they_can_give_as_seasons_come(quiet: Case) -> None:
     assert (after[day > CHANGED + 4] > 1.5 * before[day > CHANGED + 4]).all()
 
 
+def test_a_clock_counts_in_hours_whatever_it_was_moved_by() -> None:
+    case = load_bundled_case()
+    models = ModelComparison(case, ModelSettings(dx=2.0), [Interval(case.stamps[0], case.stamps[len(case.stamps) // 2])])
+    models.drivers = _of_seasons(case, fit_normalisation(case))
+    by_hours = [_errors_and_clock(models, {}, {}, {h: _moved(models, h) for h in (-hours, hours)})[1]
+                for hours in (0.5, 1.5)]  # fmt: skip
+    known = np.isfinite(by_hours[0]) & np.isfinite(by_hours[1])
+    first, second = by_hours[0][known], by_hours[1][known]
+    assert first @ second / (second @ second) == pytest.approx(1.0, abs=0.05)
+
+
 def test_a_wrong_clock_shows_as_its_column_says() -> None:
     """Weather that is said an hour late moves the sun too, which the tangent of the outdoor temperature lacks."""
     case = load_bundled_case()
     models = ModelComparison(case, ModelSettings(dx=2.0), [Interval(case.stamps[0], case.stamps[len(case.stamps) // 2])])
     models.drivers = _of_seasons(case, fit_normalisation(case))
     effects, values = {"solar_gain": ()}, {"solar_heat_gain_coefficient": 0.5}
-    moved = [_moved(models, hours) for hours in (-1.0, 1.0)]
-    late, moves = (_errors_and_clock(m, effects, values, moved) for m in (moved[1], models))
+    moved = {hours: _moved(models, hours) for hours in (-1.0, 1.0)}
+    late, moves = (_errors_and_clock(m, effects, values, moved) for m in (moved[1.0], models))
     seen = late[0] - moves[0]
-    _, tangent = _errors_and_clock(models, effects, values, [])
+    _, tangent = _errors_and_clock(models, effects, values, {})
     left = [np.sqrt(np.nanmean((seen - s) ** 2) / np.nanmean(seen**2)) for s in (moves[1], tangent)]
     assert left[0] < 0.3 < 0.8 < left[1]
 
 
 def _errors_and_clock(
     models: ModelComparison, effects: dict[str, tuple[str, ...]], values: dict[str, float],
-    moved: Sequence[ModelComparison],
+    moved: dict[float, ModelComparison],
 ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
     days = days_of_case(models, effects, values, ["clock_shift"], moved)
     number = [c.name for c in days.columns].index("weather_clock_shift")
