@@ -114,13 +114,16 @@ def test_information_of_a_new_change_is_that_of_least_squares() -> None:
     assert watch._score[-1] == pytest.approx(expected.T @ innovation.left)
 
 
-@pytest.mark.parametrize("left", [-0.3, -0.05, 0.2])
-def test_a_strength_cannot_become_less_than_nothing(left: float) -> None:
-    """The ratio is that of the likelihoods of all days, by quadrature over strength and change that leave something."""
-    begin, value, deviation, n_day = 4, 0.4, 0.5, 8
+@pytest.mark.parametrize(("left", "value"), [(-0.3, 0.4), (-0.05, 0.4), (0.2, 0.4), (0.3, 0.0), (-0.3, 0.0)])
+def test_a_strength_cannot_become_less_than_nothing(left: float, value: float) -> None:
+    """The ratio is that of the likelihoods of all days, by quadrature over strength and change that leave something.
+
+    What is absent is 0 and can only grow.
+    """
+    begin, deviation, n_day, present = 4, 0.5, 8, value > 0.0
     days = made(6, n_day)
     days.slopes[:, :, 2] = 0.0
-    own = replace(days.columns[0], value=value, present=True, is_positive=True)
+    own = replace(days.columns[0], value=value, present=present, is_positive=True)
     days = replace(days, columns=(own, *days.columns[1:]))
     days.errors[begin:] -= (left - value) * days.slopes[begin:, :, 0]
     filtered, what = DayFilter(days, deviation**2 * np.eye(N_ERROR), walk=0.0), sought(days)
@@ -142,7 +145,7 @@ def test_a_strength_cannot_become_less_than_nothing(left: float) -> None:
                   / deviation**2)[:, None] * prior  # fmt: skip
     means = []
     for size in (1.0, 0.3, 0.1, 0.03):
-        change = np.exp(-0.5 * (p / size) ** 2) * (value + v + p > 0.0)
+        change = np.exp(-0.5 * (p / size) ** 2) * (value + present * v + p > 0.0)
         chance = np.sum(seen * change) / np.sum(seen * np.exp(-0.5 * (p / size) ** 2))
         density = np.exp(-0.5 * (p[0] / size) ** 2).sum()
         means.append(np.sum(prior * change * np.exp(log_likelihood)) / density / chance / none)
