@@ -18,7 +18,7 @@ N_DAY, REFERENCE, START = 60, 40, 50
 def days_of(errors: FloatArray) -> Days:
     """Days of a model whose parameter does nothing."""
     dates = pd.date_range("2023-01-02", periods=N_DAY, freq="D", tz="UTC")
-    column = Column("window_u_value", "1", None, (), 1.0, 1.0, 0.0, 0.0, False, False)
+    column = Column("window_u_value", "1", None, (), 1.0, 1.0, 0.0, 0.0, False, True, False)
     n = errors.shape[1]
     slopes, zone = np.zeros((N_DAY, n, 1)), np.zeros(n, dtype=np.int64)
     return Days(dates, errors, slopes, (column,), slopes[:6], zone, ("A",))

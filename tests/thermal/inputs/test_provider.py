@@ -43,6 +43,17 @@ def test_sky_is_colder_than_air(lively_case: CaseOf) -> None:
     assert drivers.sky.mean() < 0.0
 
 
+def test_largest_heat_is_that_of_the_normalisation(lively_case: CaseOf) -> None:
+    case = lively_case("plan")
+    drivers, (first, *others) = telemetry_inputs(case), case.building.zone_names
+    largest = drivers.largest_heat
+    assert largest.shape == (len(case.stamps), len(case.building.zone_names))
+    assert (largest == largest[0]).all() and largest[0, 0] == drivers.normalisation.heat[first]
+    drivers.normalisation = replace(drivers.normalisation, heat={first: 7.0})
+    again = InputProvider(case.building, case.stamps, case.step, drivers.series, drivers.normalisation)
+    assert again.largest_heat[0].tolist() == [7.0, *(0.0 for _ in others)]
+
+
 def test_gaps_are_bridged(lively_case: CaseOf) -> None:
     case = lively_case("plan")
     values = case.telemetry.frame[f"weather_station/{WIND}"].copy()

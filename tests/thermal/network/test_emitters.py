@@ -256,9 +256,9 @@ def test_effects_of_a_meter_follow_the_heat() -> None:
 def test_heat_over_a_limit_is_taken_from_the_layer() -> None:
     network = build_network(house("floor"), effects=chosen({"capacity_limit": ("room",)}))
     told = {"heat": np.array([[900.0, 1.0]]), "emitted": np.array([[900.0, 1.0]])}
-    count = SimpleNamespace(heat={"room": 1000.0}, usual={})
+    most = np.array([[1000.0, 0.0]])
     inputs = cast(InputProvider, SimpleNamespace(
-        zones=("room", "hall"), normalisation=count, values=told.__getitem__, **told
+        zones=("room", "hall"), largest_heat=most, values=told.__getitem__, **told
     ))  # fmt: skip
     theta = network.values({"capacity_lost@room": 0.2})
     m = SymbolicModel(network).matrices(theta)
