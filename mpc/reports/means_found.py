@@ -123,7 +123,7 @@ def monitoring_means(found: Monitoring) -> Means:
     if found.course.withdrawn:
         trust += f" {counted(len(found.course.withdrawn), 'alarm')} proved to be a few unusual days."
     if found.course.waiting is not None:
-        trust += f" An alarm of {found.date(found.course.waiting):%-d %B} is not decided yet."
+        trust += f" An alarm of {found.date(found.course.waiting):%Y-%m-%d} is not decided yet."
     if not found.events:
         return Means("The building behaves as it did.", trust, "Nothing to do; run it again in a week.")
     shown = lasting[-1] if lasting else found.events[-1]

@@ -76,7 +76,7 @@ def monitoring_verdict(found: Monitoring) -> str:
     if found.silent_zones:
         without += f" Too little was measured {in_zones(list(found.silent_zones))} on the reference days."
     if found.course.waiting is not None:
-        without += f" An alarm of {found.date(found.course.waiting):%-d %B %Y} waits for more days."
+        without += f" An alarm of {found.date(found.course.waiting):%Y-%m-%d} waits for more days."
     if not found.events:
         return f"Nothing has changed in {watched} that were watched.{without}"
     told = [f"{_what(e)} ({in_zones(e.zones)}), {_when(found, e)}" for e in found.events[-_MOST:]]

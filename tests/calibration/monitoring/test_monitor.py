@@ -65,6 +65,15 @@ def test_a_quiet_twin_is_quiet(quiet: Case) -> None:
     assert monitoring_verdict(result) == f"Nothing has changed in {len(result.days) - REFERENCE} days that were watched."
 
 
+def test_an_alarm_that_waits_is_told(found: Monitoring, tmp_path: Path) -> None:
+    waiting = replace(found, events=(), course=replace(found.course, events=(), waiting=CHANGED + 1))
+    date = f"{found.date(CHANGED + 1):%Y-%m-%d}"
+    assert monitoring_verdict(waiting).endswith(f"An alarm of {date} waits for more days.")
+    page = write_monitoring(waiting, tmp_path / "out")
+    assert f"An alarm of {date} is not decided yet." in page.read_text(encoding="utf-8")
+    assert json.loads((page.parent / "monitoring.json").read_text(encoding="utf-8"))["waiting"].startswith(date)
+
+
 def test_files(found: Monitoring, tmp_path: Path) -> None:
     page = write_monitoring(found, tmp_path / "out")
     content = json.loads((page.parent / "monitoring.json").read_text(encoding="utf-8"))
