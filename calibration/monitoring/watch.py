@@ -367,9 +367,10 @@ class Watch:
         pair = np.maximum(varies, varies[likeliest])
         beside = logsumexp(self._ratios(np.full_like(which, likeliest), pair)[begun], axis=0)
         shows = np.log(-np.expm1(-np.maximum(1e-12, self.log_ratio[begun].max(axis=0))))
-        named = self._ratios(which, pair)[begun] - beside + weight + shows
+        ratios = self._ratios(which, pair)[begun]
+        named = ratios - beside + weight + shows
         probability = np.exp(logsumexp(named, axis=0) - logsumexp(named))
-        starts = dated(self.starts[begun], self._ratios(which, pair)[begun])
+        starts = dated(self.starts[begun], ratios)
         return Alarm(float(logsumexp(told)), starts, probability[:k], probability[k:])
 
 
