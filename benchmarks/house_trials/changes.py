@@ -201,10 +201,25 @@ def _window_opening(plant: Plant, effect: Effect) -> None:
     rng = np.random.default_rng(effect.parameters["seed"])
     for room in effect.zones:
         schedule = plant.follow(f"{room} windows", people.openings(plant.people, rng))
-        _open_area(plant, room, "windows", effect.parameters["area_m2"], schedule, 0.6)
+        open_area(plant, room, "windows", effect.parameters["area_m2"], schedule, 0.6)
 
 
-def _open_area(plant: Plant, room: str, name: str, area: float, schedule: str, height: float) -> None:
+def open_area(plant: Plant, room: str, name: str, area: float, schedule: str, height: float) -> None:
+    """Open a window, or what air passes as through one.
+
+    Parameters
+    ----------
+    plant : Plant
+        Changed.
+    room, name : str
+        Where, and what.
+    area : float
+        Open [m2].
+    schedule : str
+        How much of it is.
+    height : float
+        Over which warmth drives air [m].
+    """
     plant.add(
         "ZoneVentilation:WindandStackOpenArea", f"{room} {name}", zone_or_space_name=room, opening_area=area,
         opening_area_fraction_schedule_name=schedule, opening_effectiveness=0.25, effective_angle=0.0,
@@ -233,7 +248,7 @@ def _riser_pipe(plant: Plant, effect: Effect) -> None:
 
 
 def _fireplace_flue(plant: Plant, effect: Effect) -> None:
-    _open_area(plant, effect.zones[0], "flue", effect.parameters["area_m2"], "always", 5.0)
+    open_area(plant, effect.zones[0], "flue", effect.parameters["area_m2"], "always", 5.0)
 
 
 _CHANGES: dict[str, Callable[[Plant, Effect], None]] = {

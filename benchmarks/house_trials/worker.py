@@ -26,28 +26,33 @@ class Heater:
     ----------
     law : dict
         `power` [W], `lag` [s], `control` (`on_off` or `proportional`), `band` [K], `bias` [K], what its sensor reads
-        too much, and `limit`, the largest share of its power that it truly gives [-].
+        too much, `limit`, the largest share of its power that it truly gives [-], and `limited`, the first step of that
+        and the step after it; all by default.
     """
 
     def __init__(self, law: dict[str, Any]) -> None:
         self.law, self.on, self.stored = law, False, 0.0
+        self.limited = range(*law["limited"]) if "limited" in law else None
 
-    def step(self, air: float, set_point: float) -> tuple[float, float]:
+    def step(self, air: float, set_point: float, row: int) -> tuple[float, float]:
         """Return the power that is asked for and the mean power given in the next step [W].
 
         Parameters
         ----------
         air, set_point : float
             [degC]
+        row : int
+            Number of the step.
         """
         law = self.law
+        limit = law["limit"] if self.limited is None or row in self.limited else 1.0
         low = set_point - air - law["bias"]
         if law["control"] == "on_off":
             self.on = low > law["band"] / 2.0 or (self.on and low > -law["band"] / 2.0)
             asked = law["power"] * self.on
         else:
             asked = law["power"] * min(max(low / law["band"] + 0.3, 0.0), 1.0)
-        given = min(asked, law["limit"] * law["power"])
+        given = min(asked, limit * law["power"])
         if law["lag"] <= 0.0:
             return asked, given
         kept = math.exp(-STEP / law["lag"])
@@ -113,7 +118,7 @@ class Recorder:
         for k, (heater, handle) in enumerate(zip(self.heaters, self.handles["heater"], strict=True)):
             law, wanted = heater.law, float(self.set_points[row, k])
             air = wanted if self.last is None else float(self.last[law["column"]])
-            asked, given = heater.step(air, wanted)
+            asked, given = heater.step(air, wanted, row)
             self.heat[row, k] = asked, given
             switch = 60.0 if asked > 0.0 else -60.0  # [degC], far from any room's temperature: full power or none
             set_value(state, handle, switch if law["floor"] else given / law["power"])

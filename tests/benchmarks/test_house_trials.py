@@ -164,15 +164,17 @@ def test_thermostats_switch_within_their_band_and_heaters_keep_energy(trials):
     law = {"power": 1000.0, "lag": 900.0, "control": "on_off", "band": 0.6, "bias": 0.5, "limit": 1.0}
     heater = trials("worker").Heater(law)
     # the sensor reads 0.5 K too much: on below 19.2, off above 19.8 of true temperature
-    asked = [heater.step(air, 20.0)[0] for air in (19.25, 19.15, 19.5, 19.75, 19.85, 19.5, 19.25)]
+    asked = [heater.step(air, 20.0, 0)[0] for air in (19.25, 19.15, 19.5, 19.75, 19.85, 19.5, 19.25)]
     assert asked == [0.0, 1000.0, 1000.0, 1000.0, 0.0, 0.0, 0.0]
     rng, heater = np.random.default_rng(0), trials("worker").Heater(law | {"control": "proportional", "limit": 0.6})
     steps = np.array(
-        [heater.step(air, 20.0) for air in np.concatenate([rng.uniform(18.5, 21.0, 500), np.full(100, 25.0)])]
+        [heater.step(air, 20.0, 0) for air in np.concatenate([rng.uniform(18.5, 21.0, 500), np.full(100, 25.0)])]
     )
     given = np.minimum(steps[:, 0], 600.0)
     assert steps[:, 1].sum() == pytest.approx(given.sum(), rel=1e-9) and steps[:, 1].max() < 600.0
     np.testing.assert_allclose(trials("readings").emitted(given, 900.0), steps[:, 1], atol=1e-9)
+    limited = trials("worker").Heater(law | {"lag": 0.0, "limit": 0.6, "limited": [5, 8]})
+    assert [limited.step(15.0, 20.0, row)[1] for row in (4, 5, 7, 8)] == [1000.0, 600.0, 600.0, 1000.0]
 
 
 def test_people_leave_and_come_back_and_windows_are_opened_by_them(trials, draw):
