@@ -73,6 +73,8 @@ class DoMpcStages:
             mpc.bounds["lower", "_u", "u"], mpc.bounds["upper", "_u", "u"] = problem.lower, problem.upper
             for name, excess in edges:
                 mpc.set_nl_cons(name, excess, 0.0, soft_constraint=True, penalty_term_cons=price)
+            if problem.within.numel():
+                mpc.set_nl_cons("within", problem.kept(model.x["x"], model.u["u"], model.tvp["p"]), 0.0)
             template = mpc.get_tvp_template()
             mpc.set_tvp_fun(lambda _: self._known(template))
             mpc.setup()

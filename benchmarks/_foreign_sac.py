@@ -131,7 +131,7 @@ class ModelEnvironment(gymnasium.Env[np.ndarray, np.ndarray]):
         k, nodes, step = self._k, self.model.box.capacity.size, self.model.step
         a = self.ahead
         gain, ends = a.gain[k] + self._state[nodes:], [0.0, 1.0]
-        given = [[a.outdoor[k]], a.sun[k], gain, a.prices[k], ends, a.beyond[k].ravel()]
+        given = [[a.outdoor[k]], a.sun[k], gain, a.prices[k], ends, a.beyond[k].ravel(), a.together[k : k + 1]]
         following, cost = self.problem.stage.step(self._state[:nodes], [float(on)], np.concatenate(given))
         heat = self._state[nodes:] * self._whole.keep
         heat = heat + np.sqrt(self._whole.heat_variance) * self.np_random.normal(size=heat.size)

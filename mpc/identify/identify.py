@@ -13,8 +13,9 @@ from calibration.grey_box.network import GreyBox
 from mpc.errors import PlantError
 from mpc.identify.curves import EMITTER
 from mpc.identify.machines import Machine
-from mpc.identify.maps import Loads, map_machines
+from mpc.identify.maps import Loads, led_heat, map_machines
 from mpc.identify.model import PlantModel
+from mpc.identify.shared import shared_of
 from mpc.identify.telemetry import CARRIERS, SET, PlantTelemetry
 from thermal._types import FloatArray
 from thermal.case.points import ZONE_TEMPERATURE
@@ -91,9 +92,12 @@ def identify(telemetry: PlantTelemetry, machines: Sequence[Machine], progress: P
     signals = data.heat
     bought = {name: telemetry.column(name) for name in CARRIERS if name in telemetry.frame}
     own = [telemetry.column(m.power) if m.power and m.heat else None for m in machines]
-    maps, base = map_machines(machines, loads, signals, bought, _above(telemetry, machines), own)
+    above = _above(telemetry, machines)
+    maps, base = map_machines(machines, loads, signals, bought, above, own)
+    alone = [found.limits for found in maps]
+    shared = shared_of(led_heat(maps), telemetry.step, loads.outdoor, loads.level, above, alone)
     notes = _notes(telemetry, machines, suns)
-    model = PlantModel(telemetry.site.name, telemetry.step, box, maps, base)
+    model = PlantModel(telemetry.site.name, telemetry.step, box, maps, base, shared)
     return Identified(model, telemetry, data, loads, tuple(errors), split, notes)
 
 

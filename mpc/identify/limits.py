@@ -30,7 +30,7 @@ _SHEET_LEVEL, _SHEET_SHAPE, _TOLD = 0.1, 0.1, 0.5
 _FIFTHS = np.array([-1.2816, -0.5244, 0.0, 0.5244, 1.2816])
 
 #: Load above which a machine runs [-].
-_RUNS = 0.05
+RUNS = 0.05
 
 #: Least load that is relied on [-].
 _LEAST = 0.1
@@ -82,6 +82,21 @@ class HeatLimit:
         """
         self._bins[bin_of(outdoor)] = (outdoor, load)
 
+    @property
+    def readings(self) -> tuple[tuple[float, float], ...]:
+        """Outdoor air [K], rising, and load [-] of the last step at the limit in each `BIN`."""
+        return tuple(sorted(self._bins.values()))
+
+    def knows(self, outdoor: float) -> bool:
+        """Tell whether there is a reading within the `BIN` of an outdoor temperature.
+
+        Parameters
+        ----------
+        outdoor : float
+            [K].
+        """
+        return bin_of(outdoor) in self._bins
+
     def at(self, outdoor: FloatArray, error: FloatArray | float = 0.0) -> FloatArray:
         """Load that is relied on, shape (n,) [-].
 
@@ -92,18 +107,33 @@ class HeatLimit:
         error : ndarray, shape (n,), or float
             Its standard deviation where it is forecast [K].
         """
+        mean, deviation = self._posterior(outdoor, error)
+        return mean if not self._bins else np.asarray(np.maximum(mean - deviation, _LEAST))
+
+    def likely(self, outdoor: FloatArray) -> FloatArray:
+        """Load that is expected, shape (n,) [-].
+
+        Parameters
+        ----------
+        outdoor : ndarray, shape (n,)
+            Outdoor air [K].
+        """
+        return self._posterior(outdoor, 0.0)[0]
+
+    def _posterior(self, outdoor: FloatArray, error: FloatArray | float) -> tuple[FloatArray, FloatArray]:
+        """Mean and standard deviation of the load, shape (n,) [-]."""
         expected: FloatArray = self._near(outdoor, error).mean(axis=0)
+        level, slope, shape = self._spreads
+        variance = level**2 + (slope * (outdoor - _AT)) ** 2 + shape**2
         if not self._bins:
-            return expected
+            return expected, np.sqrt(variance)
         at, load = np.array([*self._bins.values()]).T
         own = self._kernel(at, at) + _READING**2 * np.eye(at.size)
         cross, factor = self._kernel(outdoor, at), cho_factor(own)
         near = self._near(at, _TOLD)
         mean = expected + cross @ cho_solve(factor, load - np.clip(load, near.min(axis=0), near.max(axis=0)))
-        level, slope, shape = self._spreads
-        prior = level**2 + (slope * (outdoor - _AT)) ** 2 + shape**2
-        variance = prior - np.einsum("ij,ji->i", cross, cho_solve(factor, cross.T))
-        return np.asarray(np.maximum(mean - np.sqrt(np.maximum(variance, 0.0)), _LEAST))
+        variance = variance - np.einsum("ij,ji->i", cross, cho_solve(factor, cross.T))
+        return np.asarray(mean), np.sqrt(np.maximum(variance, 0.0))
 
     @property
     def _spreads(self) -> tuple[float, float, float]:
@@ -149,7 +179,7 @@ def limits_of(outdoor: FloatArray, level: FloatArray, above: FloatArray) -> tupl
         How far the setpoint lies above the zone's air [K].
     """
     found: dict[int, tuple[float, float]] = {}
-    for k in np.flatnonzero((above > OUT_OF_REACH) & (level > _RUNS) | (level >= 1.0)):
+    for k in np.flatnonzero((above > OUT_OF_REACH) & (level > RUNS) | (level >= 1.0)):
         known = found.get(bin_of(outdoor[k]))
         if known is None or level[k] > known[1]:
             found[bin_of(outdoor[k])] = (float(outdoor[k]), float(level[k]))

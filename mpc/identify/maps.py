@@ -197,6 +197,17 @@ class Loads:
         return {name: values for name, values in found.items() if not left_out.get(name, False)}
 
 
+def led_heat(maps: Sequence[MachineMap]) -> FloatArray:
+    """Full heat of machines that are led by a setpoint, 0 of others, shape (n_machine,) [W].
+
+    Parameters
+    ----------
+    maps : sequence of MachineMap
+        Of a plant.
+    """
+    return np.array([float(m.at(m.heat, 1.0, OUTDOOR, EMITTER)) if m.operation == "setpoint" else 0.0 for m in maps])
+
+
 def regress(
     loads: Loads, values: FloatArray, machines: Sequence[int], *, base: bool = True
 ) -> tuple[list[Curve], float]:

@@ -15,13 +15,13 @@ from calibration.grey_box.network import GreyBox
 from mpc.errors import ControlError, MpcError
 from mpc.identify.curves import Curve
 from mpc.identify.machines import Machine
-from mpc.identify.maps import MachineMap, OwnPower
+from mpc.identify.maps import MachineMap, OwnPower, led_heat
 from mpc.identify.telemetry import CARRIERS
 from mpc.loop.actuators import Actuator
 from thermal._types import FloatArray
 
 #: File of a model in its folder, and the version of its contents.
-FILE, FORMAT = "model.json", 3
+FILE, FORMAT = "model.json", 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +40,9 @@ class PlantModel:
         Machines, in the order of the sources of the grey box.
     base : mapping of str to float
         Power of each kind that is bought whatever the machines do [W].
+    shared : tuple of tuple of float
+        Steps at which one source held the machines that are led by setpoints back together: outdoor air [K], and their
+        load as a share of the sum of their full loads [-], see `SharedLimit`.
     """
 
     name: str
@@ -47,6 +50,12 @@ class PlantModel:
     box: GreyBox
     maps: tuple[MachineMap, ...]
     base: Mapping[str, float] = field(default_factory=dict)
+    shared: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def led_heat(self) -> FloatArray:
+        """Full heat of machines that are led by a setpoint, 0 of others, shape (n_machine,) [W]."""
+        return led_heat(self.maps)
 
     def heat(self, states: FloatArray, levels: FloatArray, outdoor: FloatArray | float) -> FloatArray:
         """Heat of each machine, or what stands for it where it is not measured, shape (..., n_machine) [W].
@@ -101,7 +110,7 @@ class PlantModel:
         ]  # fmt: skip
         return {
             "format": FORMAT, "name": self.name, "step": self.step, "grey_box": self.box.to_dict(), "machines": maps,
-            "base": dict(self.base),
+            "base": dict(self.base), "shared": [list(pair) for pair in self.shared],
         }  # fmt: skip
 
     @classmethod
@@ -123,7 +132,8 @@ class PlantModel:
         try:
             maps = tuple(_map_of(entry) for entry in content["machines"])
             box = GreyBox.from_dict(content["grey_box"])
-            return cls(str(content["name"]), float(content["step"]), box, maps, dict(content["base"]))
+            shared = tuple((float(outdoor), float(load)) for outdoor, load in content["shared"])
+            return cls(str(content["name"]), float(content["step"]), box, maps, dict(content["base"]), shared)
         except (KeyError, TypeError, ValueError, MpcError, CalibrationError) as error:
             raise ControlError(where, expected, f"{type(error).__name__}: {error}") from error
 

@@ -37,6 +37,8 @@ class Ahead:
         Whether people are expected.
     beyond : ndarray, shape (N, n_machine, n_weight)
         Weights of what machines buy beyond their maps, see `mpc.control.identified.beyond` [W].
+    together : ndarray, shape (N,)
+        Largest load of all machines that setpoints lead, a share of their full loads; infinite where none is known [-].
     """
 
     outdoor: FloatArray
@@ -47,6 +49,7 @@ class Ahead:
     upper: FloatArray
     occupied: np.ndarray
     beyond: FloatArray
+    together: FloatArray
 
     @classmethod
     def of(cls, model: PlantModel, forecast: Forecast, location: Location) -> Ahead:
@@ -87,5 +90,5 @@ class Ahead:
             known[OUTDOOR_TEMPERATURE], np.nan_to_num(sun),
             columns(of_zones("internal_gain")) + model.box.parts["constant gain"],
             columns([_PRICES.get(carrier, "") for carrier in CARRIERS]), columns(edges[0]), columns(edges[1]), occupied,
-            np.zeros((len(table), len(model.maps), WEIGHTS)),
+            np.zeros((len(table), len(model.maps), WEIGHTS)), np.full(len(table), np.inf),
         )  # fmt: skip

@@ -24,6 +24,10 @@ AFTER, RISE = 3600.0, 0.5
 #: of what is asked for, whatever comes (range over η T), and a morning's violations change it by tenths of a kelvin.
 RATE = 0.05
 
+#: Kind of steps in which nobody is in, and the range of their back-off [K]: what thermostats hold too little, not what
+#: a machine cannot give on a cold night.
+_EMPTY, _EMPTY_RANGE = 2, (0.0, 0.2)
+
 
 @dataclass(frozen=True)
 class Guarantee:
@@ -56,7 +60,9 @@ class ConformalBackOff:
     """Adaptive conformal inference on the misses of comfort: the back-off grows by each and shrinks without.
 
     ``b_{t+1} = clip(b_t + η (err_t - α))`` with ``err_t`` 1 where a zone is outside of its band in an occupied step,
-    else 0; of each zone one b for the hour `AFTER` its lower edge has risen, and one for all others. Summed up, the
+    else 0; of each zone one b for the hour `AFTER` its lower edge has risen, and one for all others. Steps in which
+    nobody is in have a third within a small range, which learns by all of them and is never outwards of the band: a
+    thermostat that holds a zone a little under what it is told does so at night too. Summed up, the
     share of violations of each differs from α by at most ``(range + η) / (η T)`` after its T steps, whatever plant,
     model and weather do, as long as b is not held at an end of its range (Gibbs and Candès 2021, Adaptive conformal
     inference under distribution shift, doi:10.48550/arXiv.2106.00170, proposition 4.1; on the scale of the score
@@ -79,12 +85,15 @@ class ConformalBackOff:
     >>> for inside in (-0.1, 0.2):
     ...     kept.update(np.array([inside]), np.array([True]), np.array([False]))
     >>> kept.values.round(4).tolist(), kept.outside, kept.count
-    ([[0.045, 0.0]], 1, 2)
+    ([[0.045, 0.0, 0.0]], 1, 2)
     """
 
     def __init__(self, asked: Guarantee, zones: int, start: float = 0.0) -> None:
         self.asked = asked
-        self.values: FloatArray = np.full((zones, 2), np.clip(start, asked.lowest, asked.highest))
+        asked_ends = asked.lowest, asked.highest
+        ends = np.clip(_EMPTY_RANGE, *asked_ends)
+        self._lowest, self._highest = (np.array([end, end, empty]) for end, empty in zip(asked_ends, ends, strict=True))
+        self.values: FloatArray = np.clip(np.full((zones, 3), start), self._lowest, self._highest)
         self.outside, self.count = 0, 0
 
     def update(self, inside: FloatArray, occupied: BoolArray, risen: BoolArray) -> None:
@@ -95,28 +104,35 @@ class ConformalBackOff:
         inside : ndarray, shape (n_zone,)
             Distance from the edge of the band, negative outside [K]; NaN where not measured.
         occupied : ndarray of bool, shape (n_zone,)
-            Zones that count.
+            Zones with people, which count.
         risen : ndarray of bool, shape (n_zone,)
             Zones whose lower edge has risen within the hour.
         """
-        counted = np.flatnonzero(occupied & np.isfinite(inside))
-        missed = inside[counted] < 0.0
-        self.outside += int(missed.sum())
-        self.count += counted.size
-        at = counted, risen[counted].astype(int)
-        self.values[at] = np.clip(
-            self.values[at] + RATE * (missed - self.asked.share), self.asked.lowest, self.asked.highest
-        )
+        seen, missed = np.isfinite(inside), inside < 0.0
+        self.outside += int((missed & seen & occupied).sum())
+        self.count += int((seen & occupied).sum())
+        kind = _kinds(occupied, risen)
+        learns = np.flatnonzero(seen & (occupied | (kind == _EMPTY)))
+        at = learns, kind[learns]
+        moved = self.values[at] + RATE * (missed[learns] - self.asked.share)
+        self.values[at] = np.clip(moved, self._lowest[kind[learns]], self._highest[kind[learns]])
 
-    def along(self, risen: BoolArray) -> FloatArray:
+    def along(self, risen: BoolArray, occupied: BoolArray) -> FloatArray:
         """Back-off of steps, shape (N, n_zone) [K].
 
         Parameters
         ----------
         risen : ndarray of bool, shape (N, n_zone)
             Whether the lower edge has risen within the hour.
+        occupied : ndarray of bool, shape (N, n_zone)
+            Whether people are expected.
         """
-        return np.where(risen, self.values[:, 1], self.values[:, 0])
+        return np.asarray(self.values[np.arange(len(self.values)), _kinds(occupied, risen)])
+
+
+def _kinds(occupied: BoolArray, risen: BoolArray) -> np.ndarray:
+    """Give the kind of each step: 1 after a rise of the edge, else 0 with people and `_EMPTY` without."""
+    return np.where(risen, 1, np.where(occupied, 0, _EMPTY))
 
 
 def risen(lower: FloatArray, step: float, before: FloatArray | None = None) -> BoolArray:

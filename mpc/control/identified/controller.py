@@ -163,7 +163,7 @@ class IdentifiedController:
         """Distance that is kept from the lower edges, shape (N, n_zone) [K]."""
         if self.conformal is None:
             return np.full(ahead.lower.shape, self.settings.back_off)
-        return self.conformal.along(risen(ahead.lower, self.model.step, self._edges))
+        return self.conformal.along(risen(ahead.lower, self.model.step, self._edges), ahead.occupied)
 
     def step(self, measurements: Measurements, forecast: Forecast | None) -> PlannedAction:
         """Choose values of the actuators.
@@ -185,10 +185,11 @@ class IdentifiedController:
         begin = time.perf_counter()
         ahead = Ahead.of(self.model, forecast, self._location)
         self._observe(measurements, ahead)
-        self._thermostats.expect(ahead.outdoor)
-        ahead = replace(ahead, beyond=self._learner.along(ahead.outdoor, self._thermostats.most(ahead.outdoor)))
-        if self._solver is None or self._solver.n_steps != len(ahead.outdoor):
-            self._solver = StageSolver(self._problem.stage, len(ahead.outdoor), tolerance=self._tolerance)
+        outdoor, led = ahead.outdoor, self._thermostats
+        led.expect(outdoor)
+        ahead = replace(ahead, beyond=self._learner.along(outdoor, led.most(outdoor)), together=led.together(outdoor))
+        if self._solver is None or self._solver.n_steps != len(outdoor):
+            self._solver = StageSolver(self._problem.stage, len(outdoor), tolerance=self._tolerance)
             self._plan = None
         self._kept = self._back_off(ahead)
         if self._meter is not None:
@@ -201,13 +202,12 @@ class IdentifiedController:
         reasons = () if solution is not None else ("the solver found no plan",)
         self._note(levels)
         self._before, self._plan = (ahead, levels), solution
-        stamp = measurements.stamp
         values = self._values(levels, solution, ahead)
         if whole is not None:
             values |= self._problem.command(whole)
         if self._meter is not None:
             self._meter.note(levels, values, ahead, self._observer.state)
-        action = PlannedAction(values, stamp, source, reasons)
+        action = PlannedAction(values, measurements.stamp, source, reasons)
         action.step, action.seconds = self.model.step, time.perf_counter() - begin
         if solution is not None:
             action.solution = solution

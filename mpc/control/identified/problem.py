@@ -27,6 +27,9 @@ SCALE = 10.0
 #: Weight of the square of a decision [currency]: what costs the same whenever it is done is done evenly.
 _EVEN = 1e-4
 
+#: Load of all machines together that is none of a limit, a share of their full loads [-].
+_UNLIMITED = 10.0
+
 #: Band that a back-off leaves [K].
 _NARROWEST = 0.1
 
@@ -38,7 +41,7 @@ class IdentifiedProblem:
     Decisions are duties and loads of the machines from 0 to 1, within ends that are parameters of each step, so that
     one of them can be fixed without another problem. Heat and power are the maps at the step's outdoor air and the
     emitter's temperature at its start, power with what `mpc.control.identified.beyond` adds. Bands are those of the
-    air nodes.
+    air nodes. Machines that setpoints lead keep to what one source has for all of them (`SharedLimit`).
 
     Parameters
     ----------
@@ -109,9 +112,9 @@ class IdentifiedProblem:
         """The problem of a step."""
         model, box = self.model, self.model.box
         nz, ns, m = len(box.zones), len(box.suns), len(model.maps)
-        x, u, sizes = ca.SX.sym("x", 4 * nz), ca.SX.sym("u", m), [1, ns, nz, len(CARRIERS), m, m, m * WEIGHTS]
+        x, u, sizes = ca.SX.sym("x", 4 * nz), ca.SX.sym("u", m), [1, ns, nz, len(CARRIERS), m, m, m * WEIGHTS, 1]
         p, added = ca.SX.sym("p", sum(sizes)), self._added
-        outdoor, sun, gain, price, low, high, weights = ca.vertsplit(p, np.cumsum([0, *sizes]).tolist())
+        outdoor, sun, gain, price, low, high, weights, together = ca.vertsplit(p, np.cumsum([0, *sizes]).tolist())
         chosen = low + (high - low) * u
         emitter = REFERENCE + ca.mtimes(ca.DM(box.emitter_weights.T), x)
         heats, cost, electricity = [], ca.SX(0), ca.SX(model.base.get(CARRIERS[0], 0.0))
@@ -136,8 +139,10 @@ class IdentifiedProblem:
             x, u = ca.vertcat(x, *added.state.values()), ca.vertcat(u, *added.decision.values())
             p = ca.vertcat(p, added.generation)
         cost = SCALE * (cost + _EVEN * ca.sumsqr(u))
-        m = u.numel()
-        return StageProblem(x, u, p, following, cost, SCALE * end, banded, np.zeros(m), np.ones(m))
+        heat, m, within = model.led_heat, u.numel(), ca.SX(0, 1)
+        if np.count_nonzero(heat) > 1:
+            within = ca.dot(ca.DM(heat / heat.sum()), chosen) - together
+        return StageProblem(x, u, p, following, cost, SCALE * end, banded, np.zeros(m), np.ones(m), within)
 
     def data(
         self,
@@ -170,7 +175,8 @@ class IdentifiedProblem:
         keep = box.disturbed(step).keep ** np.arange(count)
         gain = ahead.gain + keep[:, None] * state[nodes:]
         weights = ahead.beyond.reshape(count, -1)
-        parameters = np.column_stack([ahead.outdoor, ahead.sun, gain, ahead.prices, *ends, weights])
+        together = np.minimum(ahead.together, _UNLIMITED)
+        parameters = np.column_stack([ahead.outdoor, ahead.sun, gain, ahead.prices, *ends, weights, together])
         # an edge lies in the bands of the step before and of the step after it; nothing can be done about the first
         wanted = np.minimum(ahead.lower + back_off, ahead.upper - _NARROWEST) - REFERENCE
         lower = np.vstack([wanted[:1], np.maximum(wanted[:-1], wanted[1:]), wanted[-1:]])

@@ -8,6 +8,7 @@ from calibration.estimation.state_space import REFERENCE
 from mpc.control.identified.forecast_error import ForecastError
 from mpc.identify.limits import OUT_OF_REACH, HeatLimit
 from mpc.identify.model import PlantModel
+from mpc.identify.shared import SharedLimit
 from mpc.loop.plant import Measurements
 from thermal._types import FloatArray
 
@@ -33,6 +34,7 @@ class Thermostats:
     def __init__(self, model: PlantModel) -> None:
         self._model = model
         self._limits = [HeatLimit(found.limits, found.sheet) for found in model.maps]
+        self._shared = SharedLimit(model.led_heat, model.step, model.shared)
         self._is_led = np.array([found.operation == "setpoint" for found in model.maps], dtype=bool)
         self._error = ForecastError(model.step)
         self._told, self._zone = np.full(len(model.maps), np.nan), np.full(len(model.box.zones), np.nan)
@@ -53,6 +55,16 @@ class Thermostats:
                 for limit, led in zip(self._limits, self._is_led, strict=True)
             ]
         )
+
+    def together(self, outdoor: FloatArray) -> FloatArray:
+        """Largest load of all machines that are led by a setpoint, shape (N,): a share of their full loads [-].
+
+        Parameters
+        ----------
+        outdoor : ndarray, shape (N,)
+            Outdoor air that is forecast for the coming steps [K].
+        """
+        return self._shared.at(outdoor, self._error.ahead(len(outdoor)))
 
     def expect(self, outdoor: FloatArray) -> None:
         """Take a forecast, so that its error is known when its steps have come.
@@ -79,15 +91,20 @@ class Thermostats:
         self._error.came(outdoor)
         end = zone + 0.5 * np.nan_to_num(np.maximum(zone - self._zone, 0.0))
         self._zone = zone
+        count = len(self._model.maps)
+        loads, missing = np.full(count, np.nan), np.full(count, -np.inf)
         for k in np.flatnonzero(self._is_led & np.isfinite(self._told)):
             found = self._model.maps[k]
             column = found.machine.heat or found.machine.power
-            if column not in measurements or not np.isfinite(measurements[column]):
-                continue
-            load = measurements[column] / float(found.at(found.heat, 1.0, outdoor, REFERENCE))
-            missing = self._told[k] - float(np.nanmean(end[self._served[k]]))
-            if load > _IDLE and (missing > OUT_OF_REACH or load > self._limits[k].at(np.array([outdoor]))[0]):
-                self._limits[k].learn(outdoor, load)
+            if column in measurements and np.isfinite(measurements[column]):
+                loads[k] = measurements[column] / float(found.at(found.heat, 1.0, outdoor, REFERENCE))
+                missing[k] = self._told[k] - float(np.nanmean(end[self._served[k]]))
+        wanted = (loads > _IDLE) & (missing > OUT_OF_REACH)
+        held_back = self._shared.learn(outdoor, loads, wanted, self._limits)
+        for k in np.flatnonzero(loads > _IDLE):
+            # what a source gives several at its limit says nothing of one of them alone
+            if (wanted[k] and not held_back) or loads[k] > self._limits[k].at(np.array([outdoor]))[0]:
+                self._limits[k].learn(outdoor, float(loads[k]))
 
     def tell(self, k: int, level: float, most: float, zone: FloatArray, edges: tuple[float, float]) -> float:
         """Choose a setpoint [K].

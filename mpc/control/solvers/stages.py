@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache, cached_property
 from typing import Any, Literal, NamedTuple, get_args
 
@@ -34,6 +34,8 @@ class StageProblem:
         What should stay within a band at the edges of the steps, by ``state`` alone [K].
     lower, upper : ndarray, shape (m,)
         Ranges of the decisions [as the decisions].
+    within : casadi.SX, shape (c,)
+        What must not be positive in any step; nothing by default [the caller's].
 
     Raises
     ------
@@ -50,6 +52,7 @@ class StageProblem:
     banded: ca.SX
     lower: FloatArray
     upper: FloatArray
+    within: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
 
     def __post_init__(self) -> None:
         n, m = self.state.numel(), self.decision.numel()
@@ -64,6 +67,11 @@ class StageProblem:
         """Function of state, decision and parameter: next state, cost."""
         given = [self.state, self.decision, self.parameter]
         return ca.Function("step", given, [ca.densify(self.next_state), ca.densify(self.cost)])
+
+    @cached_property
+    def kept(self) -> ca.Function:
+        """Function of state, decision and parameter: what must not be positive."""
+        return ca.Function("kept", [self.state, self.decision, self.parameter], [ca.densify(self.within)])
 
     @cached_property
     def end(self) -> ca.Function:
@@ -251,6 +259,7 @@ class StageSolver:
 
     def _build(self) -> Any:
         (n, m, b), count, problem = self._sizes, self.n_steps, self.problem
+        c = problem.within.numel()
         x = [ca.MX.sym(f"x_{k}", n) for k in range(count + 1)]
         u = [ca.MX.sym(f"u_{k}", m) for k in range(count)]
         slack = [ca.MX.sym(f"s_{k}", b) for k in range(count + 1)]
@@ -271,6 +280,8 @@ class StageSolver:
             if k == 0:  # dynamics come first in a stage, then what holds within it
                 rows, equal = [*rows, x[0] - start], equal + [True] * n
             rows, equal = [*rows, banded + slack[k], banded - slack[k]], equal + [False] * (2 * b)
+            if k < count and c:
+                rows, equal = [*rows, problem.kept(x[k], u[k], p[:, k])], equal + [False] * c
         nlp = {"x": ca.vertcat(*variables), "p": ca.vertcat(start, ca.vec(p), ca.vec(price)), "f": cost,
                "g": ca.vertcat(*rows)}  # fmt: skip
         options: dict[str, Any] = {"print_time": False, "expand": True, **_QUIET[self.method]}
@@ -285,14 +296,16 @@ class StageSolver:
         free = np.full((count + 1, n), np.inf)
         lower, upper = (np.broadcast_to(ends, (count + 1, m)) for ends in (self.problem.lower, self.problem.upper))
         slack, open_band = np.zeros((count + 1, b)), np.full((count + 1, b), np.inf)
-        # rows of a stage: next state, then bands from below and above; first of all the start, last no next state
-        zeros = np.zeros((count + 1, n))
-        least, most = np.hstack([zeros, data.lower, -open_band]), np.hstack([zeros, open_band, data.upper])
+        # rows of a stage: next state, bands from below and above, what is kept within; first of all the start, last
+        # bands alone
+        zeros, kept = np.zeros((count + 1, n)), np.zeros((count + 1, self.problem.within.numel()))
+        least = np.hstack([zeros, data.lower, -open_band, kept - np.inf])
+        most = np.hstack([zeros, open_band, data.upper, kept])
         return {
             "lbx": _packed(np.hstack([-free, lower, slack]), n, m),
             "ubx": _packed(np.hstack([free, upper, open_band]), n, m),
-            "lbg": np.concatenate([least[0, :n], least[:-1].ravel(), least[-1, n:]]),
-            "ubg": np.concatenate([most[0, :n], most[:-1].ravel(), most[-1, n:]]),
+            "lbg": np.concatenate([least[0, :n], least[:-1].ravel(), least[-1, n : n + 2 * b]]),
+            "ubg": np.concatenate([most[0, :n], most[:-1].ravel(), most[-1, n : n + 2 * b]]),
         }
 
     def solve(self, data: StageData, states: FloatArray, decisions: FloatArray) -> StageSolution:

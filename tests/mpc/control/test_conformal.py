@@ -22,7 +22,7 @@ def test_share_over_a_season(share: float, drift: float) -> None:
         inside = kept.values[0, 0] + miss + drift * np.sin(2 * np.pi * k / steps)
         kept.update(np.array([inside, np.nan]), np.array([True, True]), NONE)
         kept.update(np.array([-5.0, -5.0]), NONE, NONE)  # nobody is in
-    assert kept.count == steps and kept.values[1, 0] == 0.0
+    assert kept.count == steps and kept.values[1, 0] == 0.0 and kept.values[:, 2].tolist() == [0.2, 0.2]
     seen = kept.outside / kept.count
     assert abs(seen - share) < 0.01 and abs(seen - share) <= (RANGE[1] - RANGE[0] + RATE) / (RATE * steps)
 
@@ -34,11 +34,25 @@ def test_zones_and_hours_of_different_errors_have_each_their_own() -> None:
     for k in range(150 * 40):
         morning = np.full(2, k % 40 < 4)
         noise = 0.02 * rng.standard_normal(2)
-        inside = kept.along(morning[None])[0] - late * morning + noise
+        inside = kept.along(morning[None], ~NONE[None])[0] - late * morning + noise
         kept.update(inside, np.array([True, True]), morning)
         seen.append(inside < 0.0)
     assert np.array(seen).mean() == pytest.approx(0.05, abs=0.01)
     assert kept.values[0, 1] > 0.4 and np.abs(kept.values[[0, 1, 1], [0, 0, 1]]).max() < 0.12
+
+
+def test_hours_without_people_have_their_own_and_are_not_let_go() -> None:
+    """A thermostat that holds 0.05 K under what it is told; by day the band is far, which is no reason for less at night."""
+    kept, misses = ConformalBackOff(Guarantee(0.01), 2), []
+    for k in range(2000):
+        people = np.full(2, 32 <= k % 96 < 72)
+        inside = np.where(people, 1.0, kept.along(NONE[None], people[None])[0] - 0.05)
+        kept.update(inside, people, NONE)
+        misses.append(np.maximum(-inside, 0.0).max())
+    assert max(misses[96:]) < 0.02 and kept.outside == 0 and kept.count == 2 * sum(32 <= k % 96 < 72 for k in range(2000))
+    for _ in range(3000):
+        kept.update(np.ones(2), NONE, NONE)
+    assert kept.values[:, 2].tolist() == [0.0, 0.0] and (kept.values[:, 0] < -0.2).all()
 
 
 def test_hours_after_a_rise() -> None:

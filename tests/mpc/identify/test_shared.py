@@ -1,0 +1,162 @@
+"""Terminals on one source reach more alone than together: it is found where they do, and plans keep to it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+from calibration.grey_box.network import GreyBox
+from mpc.control.identified.ahead import Ahead
+from mpc.control.identified.beyond import WEIGHTS
+from mpc.control.identified.problem import IdentifiedProblem
+from mpc.control.identified.thermostats import Thermostats
+from mpc.control.solvers.stages import StageData, StageProblem, StageSolver
+from mpc.identify.curves import Curve
+from mpc.identify.limits import HeatLimit
+from mpc.identify.machines import Machine
+from mpc.identify.maps import MachineMap
+from mpc.identify.model import PlantModel
+from mpc.identify.shared import SharedLimit, shared_of
+from mpc.loop.actuators import HEATING_SETPOINT, Actuator
+from mpc.loop.plant import Measurements, PointLayout
+
+FULL, STEP = 8e3, 900.0
+ROOMS = ("north", "east", "south", "west")
+
+
+def _alone(outdoor: float) -> float:
+    """What a terminal reaches alone [-]."""
+    return 1.2 - 0.01 * (outdoor - 263.0)
+
+
+def _source(outdoor: float) -> float:
+    """Heat that the source has, over the full loads of all terminals [-]."""
+    return 0.7 + 0.02 * (outdoor - 263.0)
+
+
+def _given(wanted: np.ndarray, outdoor: float, shared: bool) -> np.ndarray:
+    """Loads of terminals that want all they can get."""
+    loads = np.where(wanted, _alone(outdoor), 0.1)
+    return loads * min(_source(outdoor) / loads.mean(), 1.0) if shared else loads
+
+
+def _known() -> list[HeatLimit]:
+    return [HeatLimit([(t, _alone(t)) for t in np.arange(255.0, 285.0, 2.0)]) for _ in ROOMS]
+
+
+def test_a_source_is_found_by_what_terminals_give_together() -> None:
+    rng, limits = np.random.default_rng(3), _known()
+    shared, own = (SharedLimit(np.full(4, FULL), STEP) for _ in range(2))
+    for _ in range(200):
+        outdoor, many = rng.uniform(258.0, 280.0), rng.integers(0, 5)
+        wanted = rng.permutation(4) < many
+        for _ in range(3):
+            shared.learn(outdoor, _given(wanted, outdoor, True), wanted, limits)
+            own.learn(outdoor, _given(wanted, outdoor, False), wanted, limits)
+    assert own.readings == () and np.isinf(own.at(np.array([270.0]))).all()
+    cold = np.arange(258.0, 272.0, 2.0)
+    said = shared.at(cold) / np.array([_source(t) for t in cold])
+    assert (said < 1.03).all() and (said > 0.93).all()  # a standard deviation below the mean is relied on
+
+
+def test_weather_that_is_new_is_the_terminals_own() -> None:
+    """In such cold nobody knows what each reaches alone: all of them giving less is no source that they share."""
+    shared, all_of_them = SharedLimit(np.full(4, FULL), STEP), np.ones(4, dtype=bool)
+    mild = [HeatLimit([(278.0, 1.0)]) for _ in ROOMS]
+    for _ in range(3):
+        assert not shared.learn(258.0, np.full(4, 0.5), all_of_them, mild)
+    assert not shared.learn(278.0, np.full(4, 0.5), np.zeros(4, dtype=bool), mild)  # nobody wants more
+    assert not shared.learn(278.0, np.full(4, 0.5), all_of_them, mild)  # since this step alone
+    assert shared.learn(278.0, np.full(4, 0.5), all_of_them, mild)
+
+
+def test_a_reading_is_the_mean_since_more_was_wanted_and_rises_with_what_is_given() -> None:
+    shared, limits, every = SharedLimit(np.full(2, FULL), STEP), _known(), np.ones(2, dtype=bool)
+    for load in (0.9, 0.5, 0.6):
+        shared.learn(265.0, np.full(2, load), every, limits[:2])
+    assert shared.readings == ((265.0, pytest.approx((0.9 + 0.5 + 0.6) / 3.0)),)
+    for _ in range(4):  # an hour in which all give more, whatever was believed
+        shared.learn(265.0, np.full(2, 1.1), ~every, limits[:2])
+    assert shared.readings[0][1] == pytest.approx(1.1)
+
+
+def test_telemetry_tells_what_the_controller_would_have_learned() -> None:
+    outdoor = np.full(8, 263.0)
+    loads = np.where(np.arange(8)[:, None] < 4, 0.1, 0.7) * np.ones(4)
+    above = np.where(np.arange(8)[:, None] < 4, -1.0, 2.0) * np.ones(4)
+    found = shared_of(np.full(4, FULL), STEP, outdoor, loads, above, [[(263.0, 1.2)]] * 4)
+    assert found == ((263.0, pytest.approx(0.7)),)
+    assert shared_of(np.full(4, FULL), STEP, outdoor, loads, above, [[(263.0, 0.75)]] * 4) == ()
+
+
+@pytest.mark.parametrize("method", ["fatrop", "ipopt"])
+def test_what_is_kept_within_costs_what_a_linear_programme_says(method) -> None:
+    """Two rooms on a source of 1.1, cheap before an edge rises at step 8."""
+    n, kept, rise = 15, 0.95, 0.8
+    price, lower = np.where(np.arange(n) < 6, 1.0, 2.0), np.where(np.arange(n + 1) < 8, 0.0, 2.5)
+    x, u, p = ca.SX.sym("x", 2), ca.SX.sym("u", 2), ca.SX.sym("p", 2)
+    cost = p[0] * ca.sum1(u)
+    problem = StageProblem(x, u, p, kept * x + rise * u, cost, ca.SX(0), x, np.zeros(2), np.ones(2), ca.sum1(u) - p[1])
+    edges = np.ones((n + 1, 2))
+    data = StageData(np.zeros(2), np.column_stack([price, np.full(n, 1.1)]), lower[:, None] * edges, np.inf * edges,
+                     100.0 * edges)  # fmt: skip
+    guess = np.full((n, 2), 0.5)
+    found = StageSolver(problem, n, method, 1e-6).solve(data, problem.follow(data, guess), guess)
+    assert str(found.status) == "converged" and found.decisions.sum(axis=1).max() <= 1.1 + 1e-6
+    course = np.array([[rise * kept ** (k - j - 1) if j < k else 0.0 for j in range(n)] for k in range(8, n + 1)])
+    reach = np.kron(np.eye(2), course)  # rooms one after the other, as in the decisions below
+    both = np.hstack([np.eye(n), np.eye(n)])
+    best = linprog(np.tile(price, 2), np.vstack([-reach, both]),
+                   np.concatenate([np.full(len(reach), -2.5), np.full(n, 1.1)]), bounds=(0.0, 1.0))  # fmt: skip
+    assert found.cost == pytest.approx(best.fun, rel=1e-3)
+    free = StageSolver(replace(problem, within=ca.SX(0, 1)), n, method, 1e-6)
+    assert free.solve(data, problem.follow(data, guess), guess).cost < 0.99 * best.fun
+
+
+def _office() -> PlantModel:
+    heat, maps, serves = Curve({"command": FULL}, {"command": 0.0}), [], {}
+    for room in ROOMS:
+        name = f"{room}/{HEATING_SETPOINT}"
+        machine = Machine(Actuator(name, "K", 285.15, 298.15), "setpoint", (room,), f"{room}/heating_power_sensor")
+        limits = tuple((float(t), _alone(t)) for t in np.arange(255.0, 285.0, 2.0))
+        maps.append(MachineMap(machine, "setpoint", heat, {"electricity": heat}, (-0.1, 0.3), limits))
+        serves[name] = (room,)
+    box = GreyBox.start(dict.fromkeys(ROOMS, 120.0), (), serves, (True,) * 4)
+    return PlantModel("office", STEP, box, tuple(maps), {}, ((263.0, 0.7),))
+
+
+def test_a_plan_keeps_to_what_the_source_has() -> None:
+    model, n = _office(), 48
+    problem = IdentifiedProblem(model)
+    edge = np.where(np.arange(n)[:, None] < 32, 288.15, 293.15) * np.ones((1, 4))
+    ahead = Ahead(np.full(n, 263.15), np.zeros((n, 0)), np.zeros((n, 4)), np.full((n, 3), 0.2), edge, edge + 10.0,
+                  edge > 0.0, np.zeros((n, 4, WEIGHTS)), np.full(n, np.inf))  # fmt: skip
+    guess, ends, most = np.full((n, 4), 0.3), (np.zeros((n, 4)), np.full((n, 4), 1.2)), []
+    for each in (ahead, replace(ahead, together=np.full(n, 0.4))):
+        data = problem.data(np.concatenate([np.full(16, -5.0), np.zeros(4)]), each, np.zeros((n, 4)), 10.0, ends)
+        found = StageSolver(problem.stage, n, tolerance=1e-6).solve(data, problem.stage.follow(data, guess), guess)
+        assert str(found.status) == "converged"
+        most.append(float((1.2 * found.decisions).mean(axis=1).max()))
+    assert most[0] > 0.6 and most[1] == pytest.approx(0.4, abs=1e-4)
+
+
+def test_a_source_that_holds_terminals_back_says_nothing_of_one_alone() -> None:
+    model = _office()
+    thermostats, layout = Thermostats(model), PointLayout(tuple(m.machine.heat for m in model.maps), "Etc/GMT-1")
+    here = np.array([263.0])
+    before = thermostats.most(here)[0]
+    for _ in range(3):
+        for k in range(4):
+            thermostats.tell(k, 1.0, 1.0, np.full((1, 4), 293.0), (288.0, 297.0))
+        thermostats.learn(Measurements(layout, 0, [0.5 * FULL] * 4), np.full(4, 290.0), 263.0)
+    # the first step, by which nothing tells a source from terminals that give less, is the terminals' own
+    assert thermostats.together(here)[0] < 0.7 and (thermostats.most(here)[0] <= before).all()
+    for _ in range(2):  # one alone
+        thermostats.tell(0, 1.0, 1.0, np.full((1, 4), 293.0), (288.0, 297.0))
+        loads = [1.2 * FULL, *[0.1 * FULL] * 3]
+        thermostats.learn(Measurements(layout, 0, loads), np.full(4, 290.0), 263.0)
+    assert thermostats.most(here)[0, 0] == pytest.approx(before[0], abs=0.03)
