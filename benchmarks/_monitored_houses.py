@@ -28,11 +28,14 @@ from thermal import Case, load_case
 
 DAYS = 130
 
+_ROOM = 20.0  # m2 of floor
+
 #: First days of the telemetry: to the end of May, or to the middle of January from September.
 _STARTS = ("2023-01-20", "2023-08-20")
 
 #: What changes, with the ids of the catalogue that are right for it, whether it is in one zone, and the range of its
-#: size: K, m2, 1/h, share, share, W/m2, m3/s, h. As in `_monitored_years`, where houses have it.
+#: size: K, m2 in a room of 20 m2, 1/h, share, share, W/m2, m3/s, h. As in `_monitored_years`, where houses have it; but
+#: rooms are of all sizes, and nobody lets a window stand open for weeks that has a bath at 10 degC.
 CHANGES: dict[str, tuple[tuple[str, ...], bool, tuple[float, float]]] = {
     "sensor_bias": (("sensor_bias",), True, (0.5, 1.3)),
     "window_open": (("window_opening",), True, (0.04, 0.15)),
@@ -95,6 +98,10 @@ def _change(spec: HouseSpec, seed: int) -> Change:
     start = int(rng.integers(50, DAYS - 50))
     end = start + int(rng.integers(21, 36)) if (seed // len(CHANGES)) % 2 else DAYS
     size = float(rng.uniform(low, high)) * (-1.0 if turned else 1.0)
+    if kind == "window_open":
+        size *= spec.room(zones[0]).area / _ROOM
+    if kind == "capacity_limit" and spec.heating.control == "on_off":
+        effects = (*effects, "flow_gain")  # off, or on and less than it says: a meter that reads too much
     return Change(kind, effects, zones if zonal else (), size, start, end)
 
 
