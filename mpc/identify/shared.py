@@ -106,7 +106,7 @@ class SharedLimit:
         back = bool(enough and (shares * loads)[held].sum() < _TOGETHER * (shares * alone)[held].sum())
         self._run = self._run + 1 if back else 0
         steps = self._run + 1  # the step before had the setpoints out of reach too
-        told = steps * self.step >= _MEAN_OF[0]
+        told = back and steps * self.step >= _MEAN_OF[0]
         mean = float(np.mean([*self._totals][-steps if told else 0 :]))
         # more than was thought possible, for an hour, is possible
         full = bool(self.readings) and len(self._totals) == self._totals.maxlen

@@ -57,7 +57,8 @@ def _rule(
     first = 1 + len(model.box.suns)  # of the inputs: outdoor air, suns, heat of the machines, gains
     heated, others = drive[:, first : first + m], np.delete(drive, np.s_[first : first + m], axis=1)
     exogenous = np.column_stack([parameters[:, :1] - REFERENCE, parameters[:, 1 : first + len(zones)]]) @ others.T
-    near = max(round(LEAD / model.step), 1)
+    near, full = max(round(LEAD / model.step), 1), model.led_heat
+    shares = full / max(float(full.sum()), 1e-9)
     state, most, runs = start[0], start[1], start[2].astype(bool).copy()
     states, levels = np.empty((count + 1, state.size)), np.zeros((count, len(served)))
     states[0] = state
@@ -77,6 +78,9 @@ def _rule(
             above = float(state[: len(zones)][mine].min()) - edge
             runs[k] = above < 0.0 or (runs[k] and above <= DIFFERENCE)
             levels[n, k] = most[n, k] * runs[k]
+        shared = float(shares @ levels[n])
+        if shared > ahead.together[n]:
+            levels[n, shares > 0.0] *= ahead.together[n] / shared
         heat = [problem.heat(k, levels[n, k], ahead.outdoor[n], emitter[k]) for k in range(m)]
         state = rest + heated @ np.array(heat)
         states[n + 1] = state

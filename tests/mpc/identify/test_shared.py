@@ -12,6 +12,7 @@ from scipy.optimize import linprog
 from calibration.grey_box.network import GreyBox
 from mpc.control.identified.ahead import Ahead
 from mpc.control.identified.beyond import WEIGHTS
+from mpc.control.identified.by_rule import _rule
 from mpc.control.identified.problem import IdentifiedProblem
 from mpc.control.identified.thermostats import Thermostats
 from mpc.control.solvers.stages import StageData, StageProblem, StageSolver
@@ -72,6 +73,10 @@ def test_weather_that_is_new_is_the_terminals_own() -> None:
     assert not shared.learn(278.0, np.full(4, 0.5), np.zeros(4, dtype=bool), mild)  # nobody wants more
     assert not shared.learn(278.0, np.full(4, 0.5), all_of_them, mild)  # since this step alone
     assert shared.learn(278.0, np.full(4, 0.5), all_of_them, mild)
+    hourly = SharedLimit(np.full(4, FULL), 3600.0)
+    for _ in range(3):
+        hourly.learn(278.0, np.full(4, 0.9), all_of_them, mild)
+    assert hourly.readings == ()
 
 
 def test_a_reading_is_the_mean_since_more_was_wanted_and_rises_with_what_is_given() -> None:
@@ -136,12 +141,14 @@ def test_a_plan_keeps_to_what_the_source_has() -> None:
     ahead = Ahead(np.full(n, 263.15), np.zeros((n, 0)), np.zeros((n, 4)), np.full((n, 3), 0.2), edge, edge + 10.0,
                   edge > 0.0, np.zeros((n, 4, WEIGHTS)), np.full(n, np.inf))  # fmt: skip
     guess, ends, most = np.full((n, 4), 0.3), (np.zeros((n, 4)), np.full((n, 4), 1.2)), []
+    start = np.concatenate([np.full(16, -5.0), np.zeros(4)])
     for each in (ahead, replace(ahead, together=np.full(n, 0.4))):
-        data = problem.data(np.concatenate([np.full(16, -5.0), np.zeros(4)]), each, np.zeros((n, 4)), 10.0, ends)
+        data = problem.data(start, each, np.zeros((n, 4)), 10.0, ends)
         found = StageSolver(problem.stage, n, tolerance=1e-6).solve(data, problem.stage.follow(data, guess), guess)
         assert str(found.status) == "converged"
-        most.append(float((1.2 * found.decisions).mean(axis=1).max()))
-    assert most[0] > 0.6 and most[1] == pytest.approx(0.4, abs=1e-4)
+        _, by_rule = _rule(problem, each, data.parameters, (start[:16], ends[1], np.zeros(4, dtype=bool)))
+        most.append([float((1.2 * found.decisions).mean(axis=1).max()), float(by_rule.mean(axis=1).max())])
+    assert min(most[0]) > 0.6 and most[1] == pytest.approx([0.4, 0.4], abs=1e-4)
 
 
 def test_a_source_that_holds_terminals_back_says_nothing_of_one_alone() -> None:
