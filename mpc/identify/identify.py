@@ -15,7 +15,7 @@ from mpc.identify.curves import EMITTER
 from mpc.identify.machines import Machine
 from mpc.identify.maps import Loads, led_heat, map_machines
 from mpc.identify.model import PlantModel
-from mpc.identify.shared import shared_of
+from mpc.identify.shared import out_of_reach, shared_of
 from mpc.identify.telemetry import CARRIERS, SET, PlantTelemetry
 from thermal._types import FloatArray
 from thermal.case.points import ZONE_TEMPERATURE
@@ -94,8 +94,9 @@ def identify(telemetry: PlantTelemetry, machines: Sequence[Machine], progress: P
     own = [telemetry.column(m.power) if m.power and m.heat else None for m in machines]
     above = _above(telemetry, machines)
     maps, base = map_machines(machines, loads, signals, bought, above, own)
-    alone = [found.limits for found in maps]
-    shared = shared_of(led_heat(maps), telemetry.step, loads.outdoor, loads.level, above, alone)
+    alone, law = [found.limits for found in maps], np.array([found.above[1] for found in maps])
+    wanted = out_of_reach(above, law)
+    shared = shared_of(led_heat(maps), telemetry.step, loads.outdoor, loads.level, wanted, alone)
     notes = _notes(telemetry, machines, suns)
     model = PlantModel(telemetry.site.name, telemetry.step, box, maps, base, shared)
     return Identified(model, telemetry, data, loads, tuple(errors), split, notes)

@@ -9,27 +9,45 @@ from dataclasses import InitVar, dataclass, field
 import numpy as np
 
 from mpc.identify.limits import BIN, OUT_OF_REACH, RUNS, HeatLimit
-from thermal._types import FloatArray
+from thermal._types import BoolArray, FloatArray
 
-#: Least share of the loads that machines reach alone below which a source holds them back together [-].
+#: Part of all machines, by their full loads, that wants more where a source may hold them back, and where what they
+#: give together is their limit whatever holds them back [-].
+_SEVERAL, _ALL = 0.5, 0.8
+
+#: Share of the loads that machines reach alone below which a source holds several of them back [-].
 _TOGETHER = 0.75
-
-#: Least part of all machines, by their full loads, that must want more [-].
-_PART = 0.5
 
 #: Time that a reading is the mean of, at least and at most: a loop's water stores heat for some minutes [s].
 _MEAN_OF = (2700.0, 3600.0)
+
+
+def out_of_reach(above: FloatArray, law: FloatArray) -> BoolArray:
+    """Tell where a zone's own controller asks for all that its machine has, shape (..., n_machine).
+
+    Parameters
+    ----------
+    above : ndarray, shape (..., n_machine)
+        How far setpoints lie above the air; NaN where nothing tells [K].
+    law : ndarray, shape (n_machine,)
+        How far they lie above it at full load: a proportional thermostat is below its setpoint at part load too [K].
+    """
+    return np.asarray(above > OUT_OF_REACH + np.maximum(law, 0.0))
 
 
 @dataclass
 class SharedLimit:
     """Most load of all machines together over outdoor air, as a share of the sum of their full loads.
 
-    Terminals on one heat pump or boiler reach more alone than together. A source at its limit is told by steps at
-    which machines of half the full load and more, two at least, have had their setpoints out of reach since the step
-    before, and give less than three quarters of what each is *known* to reach alone in such weather: in weather that
-    is new to them their own limits may have fallen. The source then gives what all machines give, in the mean of the
-    steps since, for an hour at most. Until that has been seen machines are taken to have sources of their own.
+    Terminals on one heat pump or boiler reach more alone than together. What they give together is a limit
+
+    - where nearly all of them have had setpoints out of reach since the step before, whatever holds them back;
+    - where half of them have, and give less than three quarters of what each is *known* to reach alone in such weather.
+
+    It is the mean of the steps since, of three quarters of an hour at least and an hour at most. Until that has been
+    seen, and in milder weather than that, machines are taken to have sources of their own: sources are weakest in the
+    cold, where most is asked of them. All machines are taken for one source's: where there are two, and one of them is
+    at its limit alone, too little is relied on until more is seen.
 
     Parameters
     ----------
@@ -53,7 +71,7 @@ class SharedLimit:
     seen: InitVar[Iterable[tuple[float, float]]] = ()
     _limit: HeatLimit = field(init=False)
     _totals: deque[float] = field(init=False)
-    _wanted: np.ndarray = field(init=False)
+    _wanted: BoolArray = field(init=False)
     _run: int = field(default=0, init=False)
 
     def __post_init__(self, seen: Iterable[tuple[float, float]]) -> None:
@@ -62,30 +80,28 @@ class SharedLimit:
 
     @property
     def shares(self) -> FloatArray:
-        """Of each machine in the sum of the full loads, shape (n_machine,) [-]."""
-        return np.asarray(self.weights / self.weights.sum()) if self.weights.any() else self.weights
+        """Of each machine in the sum of the full loads, shape (n_machine,) [-]; all 0 where fewer than two are led."""
+        return shares_of(self.weights)
 
     @property
     def readings(self) -> tuple[tuple[float, float], ...]:
         """Outdoor air [K], rising, and load [-] of steps at the limit."""
         return self._limit.readings
 
-    def at(self, outdoor: FloatArray, error: FloatArray | float = 0.0) -> FloatArray:
+    def at(self, outdoor: FloatArray) -> FloatArray:
         """Load that is relied on, shape (n,) [-]; infinite where nothing has been seen.
 
         Parameters
         ----------
         outdoor : ndarray, shape (n,)
             Outdoor air [K].
-        error : ndarray, shape (n,), or float
-            Its standard deviation where it is forecast [K].
         """
         if not self.readings:
             return np.full(outdoor.shape, np.inf)
-        return np.where(outdoor > self.readings[-1][0] + BIN, np.inf, self._limit.at(outdoor, error))
+        return np.where(outdoor > self.readings[-1][0] + BIN, np.inf, self._limit.at(outdoor))
 
-    def learn(self, outdoor: float, loads: FloatArray, wanted: np.ndarray, limits: Sequence[HeatLimit]) -> bool:
-        """Take a step: whether the source held machines back.
+    def learn(self, outdoor: float, loads: FloatArray, wanted: BoolArray, limits: Sequence[HeatLimit]) -> BoolArray:
+        """Take a step, and tell which machines it says something of alone, shape (n_machine,).
 
         Parameters
         ----------
@@ -94,32 +110,62 @@ class SharedLimit:
         loads : ndarray, shape (n_machine,)
             Given; NaN where nothing tells [-].
         wanted : ndarray of bool, shape (n_machine,)
-            Whether a setpoint is out of reach.
+            Whether all that there is was asked for.
         limits : sequence of HeatLimit
             Of the machines alone [-].
         """
-        shares, here = self.shares, np.array([outdoor])
-        held, self._wanted = wanted & self._wanted, np.asarray(wanted)
-        self._totals.append(float(np.nansum(shares * loads)))
-        alone = np.array([limit.at(here)[0] if limit.knows(outdoor) else 0.0 for limit in limits])
-        enough = held.sum() > 1 and shares[held].sum() >= _PART
-        back = bool(enough and (shares * loads)[held].sum() < _TOGETHER * (shares * alone)[held].sum())
+        shares, free = self.shares, np.ones(self.weights.size, dtype=bool)
+        if not shares.any() or not np.isfinite(outdoor) or not np.isfinite(loads[shares > 0.0]).all():
+            self._totals.clear()  # a mean over a gap is none
+            self._wanted, self._run = np.zeros_like(self._wanted), 0
+            return free
+        held, self._wanted = wanted & self._wanted, np.array(wanted)
+        self._totals.append(float(shares @ np.nan_to_num(loads)))
+        known = np.array([limit.knows(outdoor) for limit in limits])
+        back = self._holds_back(held, loads, known, limits, outdoor)
         self._run = self._run + 1 if back else 0
         steps = self._run + 1  # the step before had the setpoints out of reach too
-        told = back and steps * self.step >= _MEAN_OF[0]
-        mean = float(np.mean([*self._totals][-steps if told else 0 :]))
-        # more than was thought possible, for an hour, is possible
-        full = bool(self.readings) and len(self._totals) == self._totals.maxlen
-        if told or (full and outdoor <= self.readings[-1][0] + BIN and mean > self._limit.likely(here)[0]):
-            self._limit.learn(outdoor, mean)
-        return back
+        if back and steps * self.step >= _MEAN_OF[0]:
+            self._limit.learn(outdoor, float(np.mean([*self._totals][-steps:])))
+        elif len(self._totals) == self._totals.maxlen and self._limit.knows(outdoor):
+            # more than was thought possible, for an hour, is possible
+            mean = float(np.mean(self._totals))
+            if mean > self._limit.likely(np.array([outdoor]))[0]:
+                self._limit.learn(outdoor, mean)
+        part = shares[wanted].sum() if wanted.sum() > 1 else 0.0
+        return ~wanted if part >= _ALL or (part >= _SEVERAL and known[wanted].all()) else free
+
+    def _holds_back(
+        self, held: BoolArray, loads: FloatArray, known: BoolArray, limits: Sequence[HeatLimit], outdoor: float
+    ) -> bool:
+        """Tell whether what all machines give is what there is."""
+        shares = self.shares
+        part = shares[held].sum()
+        if held.sum() < 2 or part < _SEVERAL:
+            return False
+        if part >= _ALL:
+            return True
+        alone = np.array([limit.at(np.array([outdoor]))[0] for limit in limits])
+        return bool(known[held].all() and (shares * loads)[held].sum() < _TOGETHER * (shares * alone)[held].sum())
+
+
+def shares_of(weights: FloatArray) -> FloatArray:
+    """Share of each machine in the sum of the full loads, shape (n_machine,) [-]; all 0 where fewer than two have one.
+
+    Parameters
+    ----------
+    weights : ndarray, shape (n_machine,)
+        Full heat of machines that are led by a setpoint, 0 of others [W].
+    """
+    full = np.maximum(weights, 0.0)
+    return full / full.sum() if np.count_nonzero(full) > 1 else np.zeros(full.size)
 
 
 def shared_of(
-    weights: FloatArray, step: float, outdoor: FloatArray, loads: FloatArray, above: FloatArray,
+    weights: FloatArray, step: float, outdoor: FloatArray, loads: FloatArray, wanted: BoolArray,
     limits: Sequence[Iterable[tuple[float, float]]],
 ) -> tuple[tuple[float, float], ...]:  # fmt: skip
-    """Find steps in telemetry at which a source held machines back: outdoor air [K], load of all [-].
+    """Find steps in telemetry at which machines gave all that there is for them: outdoor air [K], load of all [-].
 
     Parameters
     ----------
@@ -131,13 +177,12 @@ def shared_of(
         Outdoor air [K].
     loads : ndarray, shape (n_time, n_machine)
         Given [-].
-    above : ndarray, shape (n_time, n_machine)
-        How far setpoints lie above the air of their zones; NaN of machines [K].
+    wanted : ndarray of bool, shape (n_time, n_machine)
+        Whether all that there is was asked for.
     limits : sequence of iterable of tuple of float
         Outdoor air [K] and load [-] of steps at which each machine alone was at its limit, see `HeatLimit`.
     """
     shared, alone = SharedLimit(weights, step), [HeatLimit(seen) for seen in limits]
-    wanted = (above > OUT_OF_REACH) & (loads > RUNS)
-    for k in np.flatnonzero(np.isfinite(outdoor)):
-        shared.learn(float(outdoor[k]), loads[k], wanted[k], alone)
+    for k in range(len(outdoor)):
+        shared.learn(float(outdoor[k]), loads[k], wanted[k] & (loads[k] > RUNS), alone)
     return shared.readings

@@ -354,15 +354,15 @@ class IdentifiedController:
 
     def _values(self, levels: FloatArray, solution: StageSolution | None, ahead: Ahead) -> dict[str, float]:
         """Values of the actuators for levels."""
-        count = len(self.model.box.zones)
         planned = self._observer.state[None] if solution is None else solution.states[1:]
-        zone = planned[:, :count] + REFERENCE
+        zone = planned[:, : len(self.model.box.zones)] + REFERENCE
         most, values = self._thermostats.most(ahead.outdoor[:1])[0], dict[str, float]()
+        shared = self._thermostats.shares_all(levels, ahead.outdoor[:1])
         for k, found in enumerate(self.model.maps):
             level = float(levels[k])
             if found.operation == "setpoint":
                 actuator = self._actuators[found.machine.name]
-                told = self._thermostats.tell(k, level, most[k], zone, self._edges_of(k, ahead))
+                told = self._thermostats.tell(k, level, most[k], zone, self._edges_of(k, ahead), shared)
                 value = float(np.clip(told, actuator.lowest, actuator.highest))
             else:
                 value = self._command(found, level)

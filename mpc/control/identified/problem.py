@@ -17,6 +17,7 @@ from mpc.control.identified.electric import Electric, ElectricNow, ElectricStage
 from mpc.control.solvers.stages import StageData, StageProblem
 from mpc.identify.curves import EMITTER, OUTDOOR
 from mpc.identify.model import PlantModel
+from mpc.identify.shared import shares_of
 from mpc.identify.telemetry import CARRIERS
 from mpc.scenario.rates import HOUR, KILOWATT_HOUR
 from thermal._types import FloatArray
@@ -139,9 +140,8 @@ class IdentifiedProblem:
             x, u = ca.vertcat(x, *added.state.values()), ca.vertcat(u, *added.decision.values())
             p = ca.vertcat(p, added.generation)
         cost = SCALE * (cost + _EVEN * ca.sumsqr(u))
-        heat, m, within = model.led_heat, u.numel(), ca.SX(0, 1)
-        if np.count_nonzero(heat) > 1:
-            within = ca.dot(ca.DM(heat / heat.sum()), chosen) - together
+        shares, m = shares_of(model.led_heat), u.numel()
+        within = ca.dot(ca.DM(shares), chosen) - together if shares.any() else ca.SX(0, 1)
         return StageProblem(x, u, p, following, cost, SCALE * end, banded, np.zeros(m), np.ones(m), within)
 
     def data(

@@ -8,7 +8,7 @@ from calibration.estimation.state_space import REFERENCE
 from mpc.control.identified.forecast_error import ForecastError
 from mpc.identify.limits import OUT_OF_REACH, HeatLimit
 from mpc.identify.model import PlantModel
-from mpc.identify.shared import SharedLimit
+from mpc.identify.shared import SharedLimit, out_of_reach
 from mpc.loop.plant import Measurements
 from thermal._types import FloatArray
 
@@ -64,7 +64,7 @@ class Thermostats:
         outdoor : ndarray, shape (N,)
             Outdoor air that is forecast for the coming steps [K].
         """
-        return self._shared.at(outdoor, self._error.ahead(len(outdoor)))
+        return self._shared.at(outdoor)
 
     def expect(self, outdoor: FloatArray) -> None:
         """Take a forecast, so that its error is known when its steps have come.
@@ -99,18 +99,33 @@ class Thermostats:
             if column in measurements and np.isfinite(measurements[column]):
                 loads[k] = measurements[column] / float(found.at(found.heat, 1.0, outdoor, REFERENCE))
                 missing[k] = self._told[k] - float(np.nanmean(end[self._served[k]]))
-        wanted = (loads > _IDLE) & (missing > OUT_OF_REACH)
-        held_back = self._shared.learn(outdoor, loads, wanted, self._limits)
+        full = np.array([found.above[1] for found in self._model.maps])
+        alone = self._shared.learn(outdoor, loads, (loads > _IDLE) & out_of_reach(missing, full), self._limits)
         for k in np.flatnonzero(loads > _IDLE):
-            # what a source gives several at its limit says nothing of one of them alone
-            if (wanted[k] and not held_back) or loads[k] > self._limits[k].at(np.array([outdoor]))[0]:
+            # what several at their limit give at once says nothing of one of them alone
+            if (alone[k] and missing[k] > OUT_OF_REACH) or loads[k] > self._limits[k].at(np.array([outdoor]))[0]:
                 self._limits[k].learn(outdoor, float(loads[k]))
 
-    def tell(self, k: int, level: float, most: float, zone: FloatArray, edges: tuple[float, float]) -> float:
+    def shares_all(self, levels: FloatArray, outdoor: FloatArray) -> bool:
+        """Tell whether a step's loads take all that is relied on of a shared source.
+
+        Parameters
+        ----------
+        levels : ndarray, shape (n_machine,)
+            Planned loads [-].
+        outdoor : ndarray, shape (1,)
+            Outdoor air [K].
+        """
+        return bool(self._shared.shares @ levels > self._shared.at(outdoor)[0] - _IDLE)
+
+    def tell(
+        self, k: int, level: float, most: float, zone: FloatArray, edges: tuple[float, float], shared: bool = False
+    ) -> float:
         """Choose a setpoint [K].
 
         Where all heat is wanted it is the highest temperature that is planned, out of reach for now: a machine that
-        has more than was thought, or a zone that takes less, is not held back by the error.
+        has more than was thought, or a zone that takes less, is not held back by the error. Where a source gives all
+        that is relied on, it is half a kelvin more than is planned, for the same reason.
 
         Parameters
         ----------
@@ -122,12 +137,16 @@ class Thermostats:
             Planned air at the ends of the coming steps [K].
         edges : tuple of float
             Temperatures that the zone shall not fall below, and that it is never told to rise above [K].
+        shared : bool
+            Whether the plan takes all of a shared source, see `shares_all`.
         """
         idle, full = self._model.maps[k].above
         air = zone[:, self._served[k]].mean(axis=1)
         value = float(air[0]) + idle + min(level, 1.0) * (full - idle)
         if level > most - _IDLE:
             value = max(value + _PUSH, float(air.max()))
+        elif shared:
+            value += _PUSH
         # a thermostat holds what it is told: within the edges it keeps the band where the model is wrong, or where the
         # plan leaves the band for hours that it fears not to keep
         self._told[k] = edges[0] if level <= _IDLE else max(min(value, edges[1]), edges[0])
