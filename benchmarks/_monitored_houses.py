@@ -30,7 +30,7 @@ DAYS = 130
 
 _ROOM = 20.0  # m2 of floor
 
-#: First days of the telemetry: to the end of May, or to the middle of January from September.
+#: First days of the telemetry: to the end of May, or to that of December.
 _STARTS = ("2023-01-20", "2023-08-20")
 
 #: What changes, with the ids of the catalogue that are right for it, whether it is in one zone, and the range of its
@@ -78,6 +78,8 @@ def _drawn(seed: int) -> HouseSpec:
         spec = draw_spec(1_000_000 + 100 * seed + attempt, "null", confirmation=True, lived_in=True)
         if spec.heating.meter == "room" and spec.heating.emitter != "floor" and doors(spec):
             break
+    else:
+        raise RuntimeError(f"seed {seed}: expected a house with meters by room and a door, found none in 100")
     start = _STARTS[int(rng.integers(2))]
     site = next(s for s in WEATHER_FILES if s.source == spec.climate.source)
     place = replace(spec.climate, start=start, warmer=round(float(rng.uniform(0.0, 6.0)) - site.mean, 2))

@@ -106,7 +106,7 @@ def answer(world: World, seed: int, out: Path) -> str:
             "reference": found.settings.reference_days, "seconds": time.process_time() - began, "code": code(),
             "zones": len(case.building.zone_names),
         }  # fmt: skip
-        labels[changed] = change.to_dict() | {"oracle": 0.0, "shows": None, "days": world.days}
+        labels[changed] = change.to_dict() | {"oracle": 0.0, "shows": None, "days": world.days, "world": world.name}
     label = labels[True]
     by_day = evidence_of_oracle(watched[True].days, watched[False].days, REFERENCE_DAYS)
     evidence = np.cumsum(by_day[label["start"] : label["end"]])
@@ -151,6 +151,9 @@ def report(world: World, out: Path, published: bool) -> str:
     rows = []
     for path in sorted((out / "answers").glob("*.json")):
         label = json.loads((out / "sealed" / path.name).read_text(encoding="utf-8"))
+        if label.get("world", WORLDS["office"].name) != world.name:
+            raise SystemExit(f"{out}: expected {world.name}, found {label['world']}; name another --out")
+        label.setdefault("days", world.days)  # folders of the offices from before there were houses
         rows.append(scored(label, json.loads(path.read_text(encoding="utf-8"))) | {"year": path.stem, **{
             k: label[k] for k in ("zones", "size", "start", "end", "oracle", "shows")}})  # fmt: skip
     if not rows:
@@ -236,15 +239,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--world", choices=list(WORLDS), default="office", help="whose years")
     parser.add_argument("--seeds", type=seed_range, required=True, help="first and last, such as 100-139")
-    parser.add_argument("--out", type=Path, default=Path("results/monitoring"), help="folder of labels and answers")
+    parser.add_argument("--out", type=Path, help="folder of labels and answers, of one world; results/NAME by default")
     parser.add_argument("--report", action="store_true", help="only tabulate what is answered")
     parser.add_argument("--publish", action="store_true", help="replace the table between its marks")
     options = parser.parse_args()
     world = WORLDS[options.world]
+    out = options.out or Path("results") / world.name
     if not options.report:
         for seed in options.seeds:
-            print(f"{seed}: {answer(world, seed, options.out)}", flush=True)
-    print(report(world, options.out, options.publish))
+            print(f"{seed}: {answer(world, seed, out)}", flush=True)
+    print(report(world, out, options.publish))
 
 
 if __name__ == "__main__":
