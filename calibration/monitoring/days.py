@@ -44,6 +44,11 @@ USUAL = ("solar_gain", "infiltration", "internal_gains")
 #: its tangent takes for a heat that never ends. Each secant is sought for itself.
 _SECANTS = {"capacity_lost": (0.2, 0.6), "door_airflow": (0.1,)}
 
+#: Share of people's heat that rooms without a device get, and the strengths that it is a share of: what begins may be
+#: everywhere alike, whatever the share was. Heat in all rooms was called a moved station in three of four houses with
+#: a hall that nothing heats (seeds 21, 29, 69 and 77 of the houses of ``benchmarks/monitoring.py``).
+_ELSEWHERE, _GAINS = "internal_gain_unserved_share", ("internal_gain", "internal_gain_at_home", "base_load")
+
 #: Strength of a clock that is wrong by an hour: weather that is moved tells it, sun and all, and not its tangent.
 _CLOCK = "weather_clock_shift"
 
@@ -270,7 +275,13 @@ class _Replay:
     def further(self) -> list[int]:
         """Parameters that have further secants, once for each."""
         own = self.built.network.parameters
-        return [i for i, p in enumerate(own) for _ in _SECANTS.get(p.base, ())[1:]]
+        return [i for i, p in enumerate(own) for _ in _SECANTS.get(p.base, ())[1:]] + self._everywhere
+
+    @property
+    def _everywhere(self) -> list[int]:
+        """Strengths of people's heat, where there are rooms that get a share of it alone."""
+        own = self.built.network.parameters
+        return [i for i, p in enumerate(own) if p.base in _GAINS] if any(p.base == _ELSEWHERE for p in own) else []
 
     def with_slopes(self, part: slice) -> tuple[FloatArray, FloatArray]:
         """Errors of some days (n_day, n_run, n_kept, n_zone) [K], and their derivatives on the estimation scale.
@@ -281,21 +292,26 @@ class _Replay:
         further = []
         for i, p in enumerate(self.built.network.parameters):
             if at := _SECANTS.get(p.base, ()):
-                slopes[..., i], *others = (self._secant(part, errors, i, step) for step in at)
+                slopes[..., i], *others = (self._secant(part, errors, i, step, self.theta) for step in at)
                 further += others
             elif p.base == _CLOCK and self.moved:
                 hours = sorted(self.moved)
                 earlier, later = (self._run(part, self.theta, self.moved[h])[0] for h in hours)
                 slopes[..., i] = np.nan_to_num(later - earlier) / (hours[1] - hours[0])
+        if everywhere := self._everywhere:
+            shares = np.array([p.base == _ELSEWHERE for p in self.built.network.parameters])
+            alike = np.where(shares, 1.0, self.theta)
+            before = self._run(part, alike, self.built.inputs)[0]
+            further += [self._secant(part, before, i, 1.0, alike) for i in everywhere]
         scale = np.append(self.scale, self.scale[self.further])
         return errors, np.stack([*np.moveaxis(slopes, -1, 0), *further], axis=-1) * scale
 
-    def _secant(self, part: slice, errors: FloatArray, number: int, step: float) -> FloatArray:
+    def _secant(self, part: slice, errors: FloatArray, number: int, step: float, theta: FloatArray) -> FloatArray:
         """Secant of the errors over a step of a parameter, within its range: upwards, or downwards from its end."""
         own = self.built.network.parameters[number]
-        room = own.upper - self.theta[number]
-        taken = min(step, room) if room > 0.5 * step else -min(step, self.theta[number] - own.lower)
-        there = self.theta + (np.arange(self.theta.size) == number) * taken
+        room = own.upper - theta[number]
+        taken = min(step, room) if room > 0.5 * step else -min(step, theta[number] - own.lower)
+        there = theta + (np.arange(theta.size) == number) * taken
         return np.asarray(np.nan_to_num(self._run(part, there, self.built.inputs)[0] - errors) / taken)
 
     def onset_of_bias(self, zone: int, errors: FloatArray, slopes: FloatArray) -> FloatArray:

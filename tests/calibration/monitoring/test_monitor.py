@@ -175,6 +175,28 @@ def _errors_and_clock(
     return days.errors, days.slopes[..., number]
 
 
+def test_heat_that_begins_everywhere_is_told_where_a_room_has_no_device(quiet: Case) -> None:
+    """Its secant is that of a model whose room without a device gets as much as the others; the tangent has a tenth."""
+    zone, building = quiet.building.zone_names[0], quiet.building
+    bare = replace(building, devices=tuple(d for d in building.devices if d.zone != zone))
+    frame = quiet.telemetry.frame.rename(columns=lambda c: c.replace(f"VAV_{zone}/zone_air_t", f"{zone}/zone_air_t"))
+    frame = frame.drop(columns=frame.filter(regex=f"^VAV_{zone}/").columns)
+    case = Case(bare, replace(quiet.telemetry, frame=frame))
+    models = ModelComparison(case, ModelSettings(dx=2.0), [Interval(case.stamps[0], case.stamps[len(case.stamps) // 2])])
+    models.drivers = _of_seasons(case, fit_normalisation(case))
+    effects, share = {"internal_gains": ()}, "internal_gain_unserved_share"
+    built = models.build(effects)
+    start = {p.name: p.start for p in built.network.parameters}
+    usual, alike = (days_of_case(models, effects, {**start, share: s}, []) for s in (start[share], 0.99))
+    columns = [k for k, c in enumerate(usual.columns) if c.name == "base_load"]
+    own, everywhere = (usual.slopes[..., k] for k in columns)
+    assert usual.columns[columns[0]].spread > 0.0 == usual.columns[columns[1]].spread
+    seen = usual.zone == usual.zones.index(zone)
+    expected = alike.slopes[..., [c.name for c in alike.columns].index("base_load")]
+    np.testing.assert_allclose(everywhere[:, seen], expected[:, seen], rtol=0.03, atol=1e-3 * np.abs(expected).max())
+    assert np.abs(everywhere[:, seen]).mean() > 3.0 * np.abs(own[:, seen]).mean()
+
+
 def test_what_is_in_the_model_is_watched(quiet: Case) -> None:
     result = monitor(quiet, settings=replace(SETTINGS, known=("internal_gains",), ruled_out=("valve_leak",)))
     assert "internal_gains" not in result.untestable
