@@ -22,12 +22,13 @@ doors were not stable, 144 to 183 by the values before these; 184 to 203, 220 to
 clocks were told by weather that is moved and capacity by the seasons. Of those 226 to 229, 231, 236, 239, 241 and 243
 to 258 were looked at for that; 260 to 299 confirm it. Of the houses 0 to 7 were looked at, to see that they can be
 watched, and 20 to 35, after which windows are as wide as rooms let them be and a heater that is off, or on and gives
-less than it says, counts as a meter too; nothing of the method was chosen on them. 60 to 99 are the table.
+less than it says, counts as a meter too; nothing of the method was chosen on them. 60 to 94 are the
+table, after which heat that begins is sought alike everywhere.
 
 Run from the repository's root; an interrupted run goes on where it was::
 
     python benchmarks/monitoring.py --seeds 260-299 --out results/monitoring --publish
-    python benchmarks/monitoring.py --world house --seeds 60-99 --out results/monitoring_houses --publish
+    python benchmarks/monitoring.py --world house --seeds 60-94 --out results/monitoring_houses --publish
 """
 
 from __future__ import annotations
