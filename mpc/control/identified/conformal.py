@@ -61,8 +61,9 @@ class ConformalBackOff:
 
     ``b_{t+1} = clip(b_t + η (err_t - α))`` with ``err_t`` 1 where a zone is outside of its band in an occupied step,
     else 0; of each zone one b for the hour `AFTER` its lower edge has risen, and one for all others. Steps in which
-    nobody is in have a third within a small range, which learns by all of them and is never outwards of the band: a
-    thermostat that holds a zone a little under what it is told does so at night too. Summed up, the
+    nobody is in have a third within a small range, which learns by all of them and is never outwards of the band nor
+    less than the one of steps with people: a thermostat that holds a zone a little under what it is told does so at
+    night too. Summed up, the
     share of violations of each differs from α by at most ``(range + η) / (η T)`` after its T steps, whatever plant,
     model and weather do, as long as b is not held at an end of its range (Gibbs and Candès 2021, Adaptive conformal
     inference under distribution shift, doi:10.48550/arXiv.2106.00170, proposition 4.1; on the scale of the score
@@ -127,7 +128,9 @@ class ConformalBackOff:
         occupied : ndarray of bool, shape (N, n_zone)
             Whether people are expected.
         """
-        return np.asarray(self.values[np.arange(len(self.values)), _kinds(occupied, risen)])
+        kept = self.values.copy()
+        kept[:, _EMPTY] = kept[:, [0, _EMPTY]].max(axis=1)  # a building that is let go comes back late
+        return np.asarray(kept[np.arange(len(kept)), _kinds(occupied, risen)])
 
 
 def _kinds(occupied: BoolArray, risen: BoolArray) -> np.ndarray:
