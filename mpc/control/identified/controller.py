@@ -38,8 +38,8 @@ from thermal.case.building import Location
 _AT_ONCE = 1.0 / 3.0
 
 #: Tolerances of the solver [-]: batteries and charges make problems nearly linear, whose optimum is flat; 1e-3 costs
-#: less than a tenth of a percent there. With a shared source 1e-4 costs 0.001 % and takes less than half the steps.
-_EXACT, _SHARED, _LINEAR = 1e-6, 1e-4, 1e-3
+#: less than a tenth of a percent there.
+_EXACT, _LINEAR = 1e-6, 1e-3
 
 #: A duty above this is a run [-].
 _HALF = 0.5
@@ -142,8 +142,7 @@ class IdentifiedController:
         self._problem, self._observer = IdentifiedProblem(model, electric), GreyBoxObserver(model)
         self._planner = RunPlanner(self._problem.stage, round(WHOLE / model.step))
         self._meter = None if electric is None else ElectricMeter(electric, model)
-        exact = _SHARED if self._problem.stage.within.numel() else _EXACT
-        self._tolerance = exact if electric is None else _LINEAR
+        self._tolerance = _EXACT if electric is None else _LINEAR
         self._solver: StageSolver | None = None
         self._before: tuple[Ahead, FloatArray] | None = None
         self._plan: StageSolution | None = None
