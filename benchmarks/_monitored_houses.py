@@ -17,7 +17,7 @@ from _monitored_years import Array, Change
 from energyplus_trials import climate
 from energyplus_trials.sites import WEATHER_FILES
 from house_trials import folder, model, plant, readings
-from house_trials.changes import open_area
+from house_trials.changes import leak, open_area
 from house_trials.draw_effects import CATALOGUE, doors, heated
 from house_trials.drawing import draw_spec
 from house_trials.faces import faces
@@ -126,13 +126,8 @@ def _added(made: plant.Plant, change: Change) -> None:
         open_area(made, change.zones[0], "left window", change.size, made.follow("left open", acts), 0.6)
     elif change.kind == "infiltration":
         for room in sorted({f.room for f in faces(spec.house) if f.side}):
-            made.add(
-                "ZoneInfiltration:DesignFlowRate", f"{room} new leak", schedule_name=made.follow("new leak", acts),
-                zone_or_zonelist_or_space_or_spacelist_name=room, design_flow_rate_calculation_method="Flow/Zone",
-                design_flow_rate=change.size * spec.room(room).area * spec.house.height / 3600.0,
-                constant_term_coefficient=1.0, temperature_term_coefficient=0.0, velocity_term_coefficient=0.0,
-                velocity_squared_term_coefficient=0.0,
-            )  # fmt: skip
+            flow = change.size * spec.room(room).area * spec.house.height / 3600.0
+            leak(made, room, "new leak", flow, made.follow("new leak", acts))
     elif change.kind == "internal_gains":
         for room in spec.zone_names:
             made.heat(room, "new gains", change.size * spec.room(room).area * acts, 0.4)

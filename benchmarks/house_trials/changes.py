@@ -77,12 +77,29 @@ def _infiltration(plant: Plant, effect: Effect) -> None:
                 stack_coefficient=0.000145, wind_coefficient=1e-9,
             )  # fmt: skip
             continue
-        plant.add(
-            "ZoneInfiltration:DesignFlowRate", f"{room} leak", zone_or_zonelist_or_space_or_spacelist_name=room,
-            schedule_name=schedule, design_flow_rate_calculation_method="Flow/Zone", design_flow_rate=flow,
-            constant_term_coefficient=1.0, temperature_term_coefficient=0.0, velocity_term_coefficient=0.0,
-            velocity_squared_term_coefficient=0.0,
-        )  # fmt: skip
+        leak(plant, room, "leak", flow, schedule)
+
+
+def leak(plant: Plant, room: str, name: str, flow: float, schedule: str) -> None:
+    """Let outdoor air into a room.
+
+    Parameters
+    ----------
+    plant : Plant
+        Changed.
+    room, name : str
+        Where, and what.
+    flow : float
+        Of air [m3/s].
+    schedule : str
+        How much of it there is.
+    """
+    plant.add(
+        "ZoneInfiltration:DesignFlowRate", f"{room} {name}", zone_or_zonelist_or_space_or_spacelist_name=room,
+        schedule_name=schedule, design_flow_rate_calculation_method="Flow/Zone", design_flow_rate=flow,
+        constant_term_coefficient=1.0, temperature_term_coefficient=0.0, velocity_term_coefficient=0.0,
+        velocity_squared_term_coefficient=0.0,
+    )  # fmt: skip
 
 
 def _internal_gains(plant: Plant, effect: Effect) -> None:
