@@ -29,8 +29,8 @@ from typing import Any
 import numpy as np
 from _common_control import STEPS, common_data, common_problem
 from _do_mpc_peer import SETTINGS, DoMpc
+from _pilot import pilot, plant_of
 from _table import markdown, publish, write
-from simulator_speed import pilot
 
 from mpc.control.controller.site import ResetRule
 from mpc.control.predictor.predictor import Predictor
@@ -43,16 +43,8 @@ from mpc.control.solvers.solution import Status
 from mpc.control.solvers.stages import StageData, StageMethod, StageSolution, StageSolver
 from mpc.scenario.scenario import zone_areas
 from thermal import SymbolicModel, build_network, reduced_model
-from thermal.components.air_handler import AirHandler
-from thermal.components.boiler_loop import BoilerLoop
-from thermal.components.cooling_coil import CoolingCoil
-from thermal.components.fan import Fan
-from thermal.components.pump import Pump
-from thermal.components.terminals import Terminals
-from thermal.components.water_coil import WaterCoil
 from thermal.model.modal import ModalModel, modal_model
 from thermal.system.smooth import SmoothHvac
-from thermal.system.system import HvacSystem, vav_system
 
 ORDER, WARM, SEED = 201, 12, 0
 HORIZONS = {
@@ -68,20 +60,6 @@ STAGES: dict[str, tuple[StageMethod, float]] = {
     "reference: Ipopt in stages, tolerance 1e-8": ("ipopt", 1e-8), "ours: Ipopt in stages": ("ipopt", 1e-4),
     "ours: fatrop in stages": ("fatrop", 1e-4),
 }  # fmt: skip
-
-
-def plant_of(areas: np.ndarray) -> HvacSystem:
-    """Plant with an air handler for each half of the zones."""
-    flows, handler = 3.5e-3 * areas, (np.arange(len(areas)) >= len(areas) // 2).astype(int)
-    terminals = Terminals.sized(flows, 45.0 * areas, air_handler=handler)
-    parts = []
-    for k in (0, 1):
-        flow = float(flows[handler == k].sum())
-        fans = Fan(0.9 * flow), Fan(0.9 * flow, 300.0, 100.0)
-        coil = WaterCoil.sized(8.0 * 1006.0 * flow, flow)
-        parts.append((AirHandler(*fans, CoolingCoil(15.0 * 1006.0 * flow), coil), coil))
-    pump = Pump(float(terminals.water_flow.sum()) + sum(coil.water_flow for _, coil in parts))
-    return vav_system(tuple(handler for handler, _ in parts), BoilerLoop(80.0 * areas.sum(), pump), terminals)
 
 
 def data_at(modes: ModalModel, areas: np.ndarray, horizon: Horizon, hour: float) -> HorizonData:

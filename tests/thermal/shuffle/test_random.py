@@ -2,7 +2,6 @@ import doctest
 import json
 from itertools import pairwise
 from math import comb
-from time import perf_counter
 
 import numpy as np
 import pytest
@@ -222,21 +221,6 @@ def test_bad_input_is_refused(changes, error, message):
 def test_temperatures_of_a_wrong_shape_are_refused():
     with pytest.raises(ModelError, match=r"\(2,\)"):
         RandomShuffle([[0, 1]], np.zeros((2, 2)), 0.5, None, seed=0).apply([1.0, 2.0, 3.0])
-
-
-@pytest.mark.parametrize("reach", [None, 1.25])
-def test_a_hundred_thousand_cells_take_milliseconds(reach):
-    columns, rows = np.divmod(np.arange(410 * 244), 244)
-    owner = columns // 10 * 3 + rows * 3 // 244
-    zones = [np.flatnonzero(owner == zone) for zone in range(123)]
-    shuffle = RandomShuffle(zones, np.column_stack([columns, rows]) * 0.25, 0.5, reach, seed=1)
-    temperatures = np.random.default_rng(0).normal(295.0, 1.0, columns.size)
-    times = []
-    for _ in range(8):
-        start = perf_counter()
-        shuffle.apply(temperatures)
-        times.append(perf_counter() - start)
-    assert min(times) < 0.05  # 5 to 9 ms on a quiet core
 
 
 def test_examples():

@@ -1,4 +1,4 @@
-"""A small plant, and one of the pilot's size."""
+"""Small plants."""
 
 from __future__ import annotations
 
@@ -52,13 +52,6 @@ def plant_system() -> HvacSystem:
 def gas_system() -> HvacSystem:
     """The same, one air handler, its coil burning gas."""
     return system_of(FLOWS, np.zeros(5, dtype=int), Heater(20_000.0))
-
-
-@pytest.fixture(scope="session")
-def pilot_system() -> HvacSystem:
-    """123 terminals on three air handlers."""
-    flows = np.random.default_rng(0).uniform(0.1, 0.6, 123)
-    return system_of(flows, np.arange(123) % 3)
 
 
 def told(
