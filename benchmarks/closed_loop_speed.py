@@ -29,7 +29,7 @@ from typing import Any
 
 import numpy as np
 from _table import markdown, write
-from simulator_speed import use_one_thread
+from _threads import use_one_thread
 
 from mpc.loop.make import PlantSettings, pilot_weather, simulated_plant
 from mpc.loop.noise import SensorNoise

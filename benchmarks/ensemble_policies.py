@@ -37,7 +37,7 @@ from _office_site import STEP, WARM_UP_DAYS, office, posterior_file
 from _site import Site
 from _sites import SITES
 from _table import markdown, write
-from simulator_speed import use_one_thread
+from _threads import use_one_thread
 
 from calibration.diagnosis.posterior import read_posterior
 from calibration.estimation.disturbance import DisturbanceModel

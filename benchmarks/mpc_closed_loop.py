@@ -32,7 +32,7 @@ from typing import Any
 
 import pandas as pd
 from _table import keep, markdown, publish, write
-from simulator_speed import use_one_thread
+from _threads import use_one_thread
 
 from mpc.loop.make import pilot_weather
 from mpc.loop.noise import SensorNoise

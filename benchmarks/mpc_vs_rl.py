@@ -39,7 +39,7 @@ from _office_site import SMOKE, OfficeSite
 from _site import Site
 from _sites import SITES
 from _table import keep, publish, write
-from simulator_speed import use_one_thread
+from _threads import use_one_thread
 
 PICTURES = Path(__file__).parents[1] / "docs" / "images"
 WEEKS = ("winter", "spring", "summer")

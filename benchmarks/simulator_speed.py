@@ -23,7 +23,6 @@ from __future__ import annotations
 import argparse
 import os
 import platform
-import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -35,6 +34,7 @@ import numpy.typing as npt
 import scipy.sparse as sp
 from _pilot import SEED, pilot, plant_of
 from _table import markdown, write
+from _threads import use_one_thread
 from scipy.sparse.linalg import splu
 
 from mpc.scenario.scenario import zone_areas
@@ -236,13 +236,6 @@ def report(rows: list[dict[str, Any]], bandwidth: float, apart: dict[str, float]
         f"1e-20 of their column. {platform.machine()}, {os.cpu_count()} cores, load average {os.getloadavg()[0]:.1f}.\n"
     )
     return markdown(["distance between volumes", *(f"{row['dx']:g} m" for row in rows)], lines) + "\n" + note
-
-
-def use_one_thread() -> None:
-    """Start again with one thread for linear algebra, which must be known before NumPy is loaded."""
-    if os.environ.get("OMP_NUM_THREADS") != "1":
-        os.environ["OMP_NUM_THREADS"] = "1"
-        os.execv(sys.executable, sys.orig_argv)
 
 
 def main() -> None:

@@ -23,8 +23,8 @@ from pathlib import Path
 
 from _office_site import SMOKE, OfficeSite
 from _sites import SITES
+from _threads import use_one_thread
 from _training import RECIPES, Training, train
-from simulator_speed import use_one_thread
 
 WORLDS = ("before", "plant")
 SEEDS = range(5)

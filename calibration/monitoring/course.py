@@ -21,6 +21,10 @@ from thermal._types import BoolArray, FloatArray
 #: development years of ``benchmarks/monitoring.py``, so that quiet ones have less than one alarm a year.
 THRESHOLD = 12.0
 
+#: Days for which the evidence has to stay over the threshold before it is an alarm [d], and multiple of the threshold
+#: from which it is one at once [-]. Fronts and spells of days unlike others pass within days, a change does not.
+_LASTS, _AT_ONCE = 3, 2.0
+
 #: Days after an alarm by which a change is named [d]: evidence that is enough for an alarm is not always for a name.
 NAMING_DAYS = 7
 
@@ -198,6 +202,7 @@ class _Walk:
         self.watch: Watch | None = None
         self.alarm: Alarm | None = None
         self.pending: int | None = None
+        self.lasts = 0
         self.events: list[Event] = []
         self.places: list[int] = []
         self.lasting: list[int] = []
@@ -228,7 +233,8 @@ class _Walk:
         alarm = self.watch.take(day, self.days, innovation, (state, ahead), self.pending)
         if self.pending is None:
             self.evidence[day] = alarm.log_evidence
-            if alarm.log_evidence > self.threshold:
+            self.lasts = self.lasts + 1 if alarm.log_evidence > self.threshold else 0
+            if self.lasts > _LASTS or alarm.log_evidence > _AT_ONCE * self.threshold:
                 self.pending = day
         self.alarm = alarm
         self._settle_if_noticed(day, alarm, self.watch)
@@ -252,7 +258,7 @@ class _Walk:
         if alarm.log_evidence < self.threshold:  # a few days unlike others look like a change and do not last
             if alarm.log_evidence < _GONE * self.threshold or day - noticed >= _LONGEST_WAIT:
                 self.withdrawn.append(noticed)
-                self.pending = None
+                self.pending, self.lasts = None, 0
             return
         number, event = self._named(alarm, day, watch, noticed)
         for k in self.lasting:
@@ -278,7 +284,7 @@ class _Walk:
         """Filter anew from a day on, and watch again once today is past."""
         self.day = start
         self.states = self.states[: start + 1]
-        self.watched_from, self.watch, self.pending = day + 1, None, None
+        self.watched_from, self.watch, self.pending, self.lasts = day + 1, None, None, 0
 
     def _named(self, alarm: Alarm, day: int, watch: Watch, noticed: int) -> tuple[int, Event]:
         """Tell the likeliest effect, then where it is; its strength by its place among what is sought."""

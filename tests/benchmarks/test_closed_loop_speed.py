@@ -15,7 +15,7 @@ from thermal.system.sizing import size_system
 @pytest.fixture(scope="module")
 def speed(script: Callable[[str], ModuleType]) -> ModuleType:
     script("_table")
-    script("simulator_speed")
+    script("_threads")
     return script("closed_loop_speed")
 
 

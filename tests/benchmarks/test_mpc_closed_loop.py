@@ -12,7 +12,7 @@ import pytest
 @pytest.fixture(scope="module")
 def loop(script: Callable[[str], ModuleType]) -> ModuleType:
     script("_table")
-    script("simulator_speed")
+    script("_threads")
     return script("mpc_closed_loop")
 
 

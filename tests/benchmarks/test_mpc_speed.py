@@ -10,7 +10,7 @@ import pytest
 
 @pytest.fixture(scope="module")
 def speed(script) -> ModuleType:
-    parts = [script(name) for name in ("_table", "simulator_speed", "_common_control", "_do_mpc_peer", "mpc_speed")]
+    parts = [script(name) for name in ("_table", "_pilot", "_common_control", "_do_mpc_peer", "mpc_speed")]
     with pytest.MonkeyPatch.context() as patch:
         for module in parts[2:]:
             patch.setattr(module, "STEPS", 6)

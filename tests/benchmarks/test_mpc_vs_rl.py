@@ -44,7 +44,7 @@ def comparison(script: Callable[[str], ModuleType], tables: ModuleType) -> Modul
         "_comparison",
     ):
         script(name)
-    script("simulator_speed")
+    script("_threads")
     return script("mpc_vs_rl")
 
 
