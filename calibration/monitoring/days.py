@@ -21,6 +21,7 @@ from thermal._types import BoolArray, FloatArray, IntArray
 from thermal.effects.catalogue import effect_of
 from thermal.effects.effect import zones_of
 from thermal.effects.unknown import UNKNOWN
+from thermal.inputs.provider import InputProvider
 from thermal.model.case_replay import Inputs, replay_inputs
 from thermal.model.reduce import SHIFTS, reduced_model
 from thermal.parameters import Parameter
@@ -48,6 +49,10 @@ _SECANTS = {"capacity_lost": (0.2, 0.6), "door_airflow": (0.1,)}
 #: everywhere alike, whatever the share was. Heat in all rooms was called a moved station in three of four houses with
 #: a hall that nothing heats (seeds 21, 29, 69 and 77 of the houses of ``benchmarks/monitoring.py``).
 _ELSEWHERE, _GAINS = "internal_gain_unserved_share", ("internal_gain", "internal_gain_at_home", "base_load")
+
+#: Area of a window. Where doors are open or walls leak, wind blows through it, many times what it exchanges on one side
+#: of a room.
+_WINDOW = "opened_window_area"
 
 #: Strength of a clock that is wrong by an hour: weather that is moved tells it, sun and all, and not its tangent.
 _CLOCK = "weather_clock_shift"
@@ -159,6 +164,7 @@ def days_of_case(
     values: Mapping[str, float],
     candidates: Sequence[str],
     moved: Mapping[float, ModelComparison] | None = None,
+    across: InputProvider | None = None,
     progress: Progress | None = None,
 ) -> Days:
     """Run the model over all the telemetry, with the sensitivities to all that may be or change.
@@ -176,6 +182,8 @@ def days_of_case(
     moved : mapping of float to ModelComparison, optional
         The case with its weather said so much later [h], twice, which says what a wrong clock does; none where the
         weather's clock is not watched.
+    across : InputProvider, optional
+        The case with air that leaves by another way than it came in; none where windows are open on one side only.
     progress : callable, optional
         Called with stage, done, total.
 
@@ -187,7 +195,8 @@ def days_of_case(
     built = models.build({**effects, **{e: () for e in candidates if e not in effects}})
     theta = built.theta(values)
     clocks = {hours: replay_inputs(m.case, built.network, m.drivers) for hours, m in (moved or {}).items()}
-    replay = _Replay(models, built, theta, clocks)
+    draught = None if across is None else replay_inputs(models.case, built.network, across)
+    replay = _Replay(models, built, theta, clocks, draught)
     own, dates = built.network.parameters, replay.dates
     by = [*range(len(theta)), *replay.further]
     errors, slopes = np.full((len(dates), *replay.shape), np.nan), np.zeros((len(dates), *replay.shape, len(by)))
@@ -252,10 +261,11 @@ class _Replay:
     """Runs of the model from midnight to midnight, half way and at their end."""
 
     def __init__(
-        self, models: ModelComparison, built: Built, theta: FloatArray, moved: Mapping[float, Inputs]
-    ) -> None:
+        self, models: ModelComparison, built: Built, theta: FloatArray, moved: Mapping[float, Inputs],
+        draught: Inputs | None,
+    ) -> None:  # fmt: skip
         self.built, self.theta, self.spin_up = built, theta, models.settings.spin_up_seconds
-        self.moved = moved
+        self.moved, self.draught = moved, draught
         # a basis of this θ alone interpolates tangents too, as in a screening
         self.model = reduced_model(built.grid, [theta], shifts=SHIFTS)
         self.problem = models.problem(built, theta)
@@ -273,9 +283,16 @@ class _Replay:
 
     @property
     def further(self) -> list[int]:
-        """Parameters that have further secants, once for each."""
+        """Parameters that have further derivatives, once for each."""
         own = self.built.network.parameters
-        return [i for i, p in enumerate(own) for _ in _SECANTS.get(p.base, ())[1:]] + self._everywhere
+        secants = [i for i, p in enumerate(own) for _ in _SECANTS.get(p.base, ())[1:]]
+        return secants + self._everywhere + self._windows
+
+    @property
+    def _windows(self) -> list[int]:
+        """Areas of windows, where air may leave by another way than it came in."""
+        own = self.built.network.parameters
+        return [i for i, p in enumerate(own) if p.base == _WINDOW] if self.draught is not None else []
 
     @property
     def _everywhere(self) -> list[int]:
@@ -286,7 +303,7 @@ class _Replay:
     def with_slopes(self, part: slice) -> tuple[FloatArray, FloatArray]:
         """Errors of some days (n_day, n_run, n_kept, n_zone) [K], and their derivatives on the estimation scale.
 
-        Derivatives by the parameters, and after them the further secants.
+        Derivatives by the parameters, and after them the further ones.
         """
         errors, slopes = self._run(part, self.theta, self.built.inputs, slopes=True)
         further = []
@@ -303,6 +320,9 @@ class _Replay:
             alike = np.where(shares, 1.0, self.theta)
             before = self._run(part, alike, self.built.inputs)[0]
             further += [self._secant(part, before, i, 1.0, alike) for i in everywhere]
+        if self.draught is not None:
+            by_area = self._run(part, self.theta, self.draught, slopes=True)[1]
+            further += [by_area[..., i] for i in self._windows]
         scale = np.append(self.scale, self.scale[self.further])
         return errors, np.stack([*np.moveaxis(slopes, -1, 0), *further], axis=-1) * scale
 

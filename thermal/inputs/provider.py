@@ -6,7 +6,7 @@ of a model what it is made of (`Signal.inputs`), so that nobody has to try.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
 
 import numpy as np
@@ -26,6 +26,7 @@ from thermal.inputs.normalisation import (
     supply_air,
 )
 from thermal.inputs.sun import Sun, estimated_sun, suffices, sun_of
+from thermal.inputs.windows import across, on_one_side
 
 #: Stefan-Boltzmann constant [W/m2/K4].
 STEFAN_BOLTZMANN = 5.670374419e-8
@@ -343,15 +344,18 @@ class InputProvider:
 
     @cached_property
     def through_windows(self) -> FloatArray:
-        """Air that passes an open window, times how much colder it is outdoor: shape (n_time, n_zone) [K*m/s].
+        """Air that passes an open window, times how much colder it is outdoor: shape (n_time, n_zone) [K*m/s]."""
+        return self._through(on_one_side)
 
-        Flow per area of a window of 1 m height on one side of a room, ``½ (0.001 v² + 0.0035 h |ΔT| + 0.01)^½``
-        (de Gids and Phaff 1982, Air Infiltration Review 4(1), 1-5).
-        """
+    @property
+    def across_windows(self) -> FloatArray:
+        """The same where air leaves by another way than it came in."""
+        return self._through(across)
+
+    def _through(self, law: Callable[[FloatArray, FloatArray], FloatArray]) -> FloatArray:
         difference = self.outdoor[:, None] - self.usual
         wind = self.wind if self.gives("wind") else np.full(len(self.stamps), _USUAL_WIND)
-        speed = 0.5 * np.sqrt(0.001 * wind[:, None] ** 2 + 0.0035 * np.abs(difference) + 0.01)
-        return np.asarray(speed * difference)
+        return np.asarray(law(wind[:, None], difference) * difference)
 
     outdoor_rate = _input("outdoor_rate", "Change of the outdoor temperature, shape (n_time,) [K/h].")
     occupancy_rate = _input("occupancy_rate", "Change of the presence of people, shape (n_time,) [1/h].")
