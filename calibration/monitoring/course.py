@@ -11,8 +11,9 @@ import pandas as pd
 
 from calibration.errors import NotEnoughDataError
 from calibration.monitoring.days import Days
+from calibration.monitoring.dispersion import Dispersion
 from calibration.monitoring.filter import DayFilter, Found, State, is_told, noise_of
-from calibration.monitoring.watch import Alarm, Dispersion, Sought, Watch, sought
+from calibration.monitoring.watch import Alarm, Sought, Watch, sought
 from calibration.progress import Progress
 from thermal._types import BoolArray, FloatArray
 

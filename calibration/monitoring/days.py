@@ -50,8 +50,7 @@ _SECANTS = {"capacity_lost": (0.2, 0.6), "door_airflow": (0.1,)}
 #: a hall that nothing heats (seeds 21, 29, 69 and 77 of the houses of ``benchmarks/monitoring.py``).
 _ELSEWHERE, _GAINS = "internal_gain_unserved_share", ("internal_gain", "internal_gain_at_home", "base_load")
 
-#: Area of a window. Where doors are open or walls leak, wind blows through it, many times what it exchanges on one side
-#: of a room.
+#: Area of a window, through which wind blows where doors are open: many times what it exchanges on one side of a room.
 _WINDOW = "opened_window_area"
 
 #: Strength of a clock that is wrong by an hour: weather that is moved tells it, sun and all, and not its tangent.
@@ -97,8 +96,9 @@ class Column:
         Whether it may change from one day to the next.
     present : bool
         Whether the model has it, or the effect that it belongs to.
-    is_positive : bool
-        Whether it is the strength of something that cannot be less than nothing, as a leak.
+    limits : tuple of float
+        Least and most that a strength can be, infinite where nothing limits it: no leak is less than nothing, and no
+        terminal loses more than all that it can give [parameter unit].
     """
 
     name: str
@@ -111,7 +111,7 @@ class Column:
     value: float
     may_change: bool
     present: bool
-    is_positive: bool
+    limits: tuple[float, float]
 
     @property
     def is_unknown(self) -> bool:
@@ -390,8 +390,11 @@ def _column(p: Parameter, value: float, present: bool) -> Column:
     zonal = effect_of(p.effect).zonal if p.effect is not None else False
     zones = zones_of([p.member]) if zonal and p.member is not None else ()
     changes = is_strength(p.name, p.effect) and p.effect in (*MAY_CHANGE, *NO_CAUSE)
+    is_positive = changes and p.lower == 0.0
+    is_share = is_positive and p.unit == "1" and p.upper <= 1.0
     return Column(
         p.name, p.unit, p.effect, zones, p.prior_deviation, p.prior_deviation * (1.0 if present else _SELDOM),
         p.transform(p.start) - p.transform(value), float(value),
-        may_change=changes, present=present, is_positive=changes and p.lower == 0.0,
+        may_change=changes, present=present,
+        limits=(0.0 if is_positive else -np.inf, 1.0 if is_share else np.inf),
     )  # fmt: skip

@@ -12,6 +12,8 @@ after them by its estimate v̂ with the variance P and what it has made of the c
 
     Φ((v̂ + (1 - F) m) / (P + (1 - F)² q)^½) / Φ(u / (σ² + s²)^½)                                               (M4)
 
+and likewise where v + p, a share, cannot be more than 1.
+
 The sum of the ratios over all τ, weighted over all that may change, is the e-detector of Shiryaev and Roberts, and an
 alarm where it exceeds A comes on average after A days or more while nothing has changed (Shin, Ramdas and Rinaldo 2024,
 doi:10.51387/23-NEJSDS51), whatever the number of changes that are sought.
@@ -27,6 +29,7 @@ from scipy.linalg import solve_triangular
 from scipy.special import log_ndtr, logsumexp
 
 from calibration.monitoring.days import NO_CAUSE, Column, Days, coming
+from calibration.monitoring.dispersion import Dispersion
 from calibration.monitoring.filter import Found, Innovation, State
 from thermal._types import BoolArray, FloatArray, IntArray
 
@@ -51,11 +54,6 @@ SLOWLY, OVER = ("sensor_bias", *NO_CAUSE), (3, 6, 12)
 
 #: Prior weight of the end of each change that was found, beside all that may begin [-].
 _ENDS = 0.5
-
-
-#: Days over which scores are correlated, days that have no say yet [d], and what a ratio of variances is taken for
-#: before there are days, with the number of days that this counts for [-, d].
-_LAGS, _UNSEEN, _AT_FIRST = 14, 14, (3.0, 14)
 
 
 @dataclass(frozen=True)
@@ -129,56 +127,6 @@ def sought(days: Days) -> Sought:
     return Sought(columns, which, over, weight / weight.sum(), shares, onset)
 
 
-class Dispersion:
-    """How much more the days vary in the direction of each change than the filter's noise says: the case's own level.
-
-    A model that lacks how people come and go, or a season, errs in these directions day after day. With the score u_d
-    and the information i_d of a change that begins on day d, both of one day, the variance of their sum is
-    ``Σ_d Σ_l w_l u_d u_d-l`` with Bartlett's weights (Newey and West 1987, doi:10.2307/1913610). The noise says that it
-    is ``Σ_d i_d``. Scores and information of the watch are divided by the ratio, 1 at least: a quasi-likelihood.
-
-    Parameters
-    ----------
-    n_day, n_sought : int
-        Days of the telemetry, and what may change.
-    """
-
-    def __init__(self, n_day: int, n_sought: int) -> None:
-        self.score, self.information = np.zeros((n_day, n_sought)), np.zeros((n_day, n_sought))
-
-    def put(self, day: int, own: FloatArray, innovation: Innovation) -> None:
-        """Keep what a day says of changes that begin on it; a day that is filtered anew is replaced.
-
-        Parameters
-        ----------
-        day : int
-            Its number.
-        own : ndarray, shape (n_seen, n_sought)
-            What a unit of each change does to its errors [K].
-        innovation : Innovation
-            Of the filter.
-        """
-        white = solve_triangular(innovation.root, own, lower=True)
-        self.score[day], self.information[day] = innovation.white @ white, (white**2).sum(axis=0)
-
-    def at(self, day: int) -> FloatArray:
-        """Ratio of the variances by the days up to two weeks before, shape (n_sought,) [-].
-
-        Parameters
-        ----------
-        day : int
-            Whose changes of the last two weeks have no say.
-        """
-        last = max(0, day - _UNSEEN)
-        u, i = self.score[:last], self.information[:last]
-        variance = (u**2).sum(axis=0)
-        for lag in range(1, min(_LAGS, last - 1) + 1):
-            variance = variance + 2.0 * (1.0 - lag / (_LAGS + 1.0)) * (u[lag:] * u[:-lag]).sum(axis=0)
-        usual = i.sum(axis=0) / max(1, last)
-        return np.asarray(np.maximum(1.0, (variance + _AT_FIRST[0] * _AT_FIRST[1] * usual)
-                                     / np.maximum(i.sum(axis=0) + _AT_FIRST[1] * usual, 1e-12)))  # fmt: skip
-
-
 @dataclass(frozen=True)
 class Alarm:
     """What the evidence says on a day.
@@ -236,7 +184,8 @@ class Watch:
         self._score, self._information = np.zeros((0, k)), np.zeros((0, k))
         self._top = np.zeros((0, k + len(self.ends)))
         self._deviation = np.array([what.columns[i].deviation for i in what.which])
-        self._bounded = np.array([what.columns[i].is_positive for i in what.which], dtype=bool)
+        self._most = np.array([what.columns[i].limits[1] for i in what.which])
+        self._bounded = np.array([what.columns[i].limits[0] == 0.0 for i in what.which], dtype=bool)
         self._parts = [self._parts_of(i, n_state, found) for i in what.which]
         self._room, self._unsure, self._kept = np.zeros((0, k)), np.zeros((0, k)), np.ones((0, k))
         self._left = np.zeros(k), np.zeros(k)
@@ -338,9 +287,9 @@ class Watch:
             spread = size * self._deviation[at]
             sharp = information + spread**-2.0
             ratio = 0.5 * score**2 / sharp - 0.5 * np.log1p(information * spread**2)
-            kept, (left, unsure) = self._kept[:, at], self._left
-            after = log_ndtr((left[at] + kept * score / sharp) / np.sqrt(unsure[at] + kept**2 / sharp))
-            before = log_ndtr(self._room[:, at] / np.sqrt(spread**2 + self._unsure[:, at]))
+            kept, (left, unsure), most = self._kept[:, at], self._left, self._most[at]
+            after = _log_within(most, left[at] + kept * score / sharp, unsure[at] + kept**2 / sharp)
+            before = _log_within(most, self._room[:, at], spread**2 + self._unsure[:, at])
             parts.append(ratio + np.where(self._bounded[at], after - before, 0.0))
         begun = logsumexp(np.array(parts), axis=0) - np.log(len(parts))
         lost = np.concatenate([np.zeros(k), [size for _, size in self.ends]])[which]
@@ -372,6 +321,17 @@ class Watch:
         probability = np.exp(logsumexp(named, axis=0) - logsumexp(named))
         starts = dated(self.starts[begun], ratios)
         return Alarm(float(logsumexp(told)), starts, probability[:k], probability[k:])
+
+
+def _log_within(most: FloatArray, mean: FloatArray, variance: FloatArray) -> FloatArray:
+    """Logarithm of the probability that what is normal is between 0 and the most that it can be [-].
+
+    In the tail that is the smaller one, where the difference of two probabilities is not lost.
+    """
+    deviation, above = np.sqrt(variance), mean > 0.5 * most
+    near = log_ndtr(np.where(above, most - mean, mean) / deviation)
+    far = log_ndtr(np.where(above, -mean, mean - most) / deviation)
+    return np.asarray(near + np.log1p(-np.exp(np.minimum(far - near, -1e-300))))
 
 
 def dated(starts: IntArray, ratios: FloatArray) -> IntArray:

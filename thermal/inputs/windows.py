@@ -12,8 +12,9 @@ _GRAVITY = 9.80665
 #: Height of a window [m], and temperature at which warm air is so much lighter [K].
 _HEIGHT, _TEMPERATURE = 1.0, 285.0
 
-#: Air that a wind at an angle drives through an opening over the wind's speed, and discharge of an opening [-].
-_BY_WIND, _DISCHARGE = 0.3, 0.65
+#: Air that a wind at an angle drives through an opening over the wind's speed there, which among houses is half of what
+#: a station on a field of 10 m measures; and discharge of an opening [-].
+_BY_WIND, _DISCHARGE = 0.3 * 0.5, 0.65
 
 
 def on_one_side(wind: FloatArray, difference: FloatArray) -> FloatArray:
@@ -40,7 +41,7 @@ def across(wind: FloatArray, difference: FloatArray) -> FloatArray:
     """Flow per area where air leaves by another way than it came in, ``((C_v v)² + C_D² 2 g Δh |ΔT| / T)^½`` [m/s].
 
     Half of the window's height lies between its middle and where pressures are alike. ASHRAE Handbook Fundamentals,
-    chapter 16, flow through large openings, with ``C_v`` of winds at an angle.
+    chapter 16, flow through large openings, with ``C_v`` of winds at an angle and the wind's speed of chapter 24.
 
     Parameters
     ----------
@@ -52,7 +53,7 @@ def across(wind: FloatArray, difference: FloatArray) -> FloatArray:
     Examples
     --------
     >>> round(float(across(np.array(4.0), np.array(10.0))), 3)
-    1.259
+    0.711
     """
     stack = _DISCHARGE**2 * 2.0 * _GRAVITY * 0.5 * _HEIGHT * np.abs(difference) / _TEMPERATURE
     return np.asarray(np.sqrt((_BY_WIND * wind) ** 2 + stack))

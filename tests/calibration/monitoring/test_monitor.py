@@ -175,6 +175,20 @@ def _errors_and_clock(
     return days.errors, days.slopes[..., number]
 
 
+def test_a_window_is_sought_on_one_side_and_across(quiet: Case) -> None:
+    """Each derivative is that of a model whose windows let as much air through."""
+    models = ModelComparison(quiet, ModelSettings(dx=2.0), [Interval(quiet.stamps[0], quiet.stamps[200])])
+    normalisation = fit_normalisation(quiet)
+    one_side, across = (_of_seasons(quiet, normalisation, across=a) for a in (False, True))
+    both, *each = (days_of_case(replace(models, drivers=drivers), {}, {}, ["window_opening"], None, further)
+                   for drivers, further in ((one_side, across), (one_side, None), (across, None)))  # fmt: skip
+    name = f"opened_window_area@{quiet.building.zone_names[0]}"
+    found = [np.array([c.name == name for c in days.columns]) for days in (both, *each)]
+    assert [int(f.sum()) for f in found] == [2, 1, 1]
+    for number, (days, of) in enumerate(zip(each, found[1:], strict=True)):
+        assert both.slopes[..., found[0]][..., number] == pytest.approx(days.slopes[..., of][..., 0])
+
+
 def test_heat_that_begins_everywhere_is_told_where_a_room_has_no_device(quiet: Case) -> None:
     """Its secant is that of a model whose room without a device gets as much as the others; the tangent has a tenth."""
     zone, building = quiet.building.zone_names[0], quiet.building

@@ -11,8 +11,9 @@ import pytest
 from calibration.errors import NotEnoughDataError
 from calibration.monitoring.course import NAMING_DAYS, follow
 from calibration.monitoring.days import ONSET, Column, Days
+from calibration.monitoring.dispersion import Dispersion
 from calibration.monitoring.filter import DayFilter, Found, State, noise_of
-from calibration.monitoring.watch import Dispersion, Watch, sought
+from calibration.monitoring.watch import Watch, sought
 from thermal._types import FloatArray
 
 N_ERROR, REFERENCE = 6, 30
@@ -20,7 +21,7 @@ N_ERROR, REFERENCE = 6, 30
 
 def column(name: str, effect: str | None, changes: bool, zones: tuple[str, ...] = ()) -> Column:
     """Make a column whose prior is one unit wide."""
-    return Column(name, "1", effect, zones, 1.0, 0.3, 0.0, 0.0, changes, False, False)
+    return Column(name, "1", effect, zones, 1.0, 0.3, 0.0, 0.0, changes, False, (-np.inf, np.inf))
 
 
 def made(seed: int, n_day: int, shift: float = 0.0, start: int = 0, end: int = 10**6, over: int = 0) -> Days:
@@ -114,16 +115,17 @@ def test_information_of_a_new_change_is_that_of_least_squares() -> None:
     assert watch._score[-1] == pytest.approx(expected.T @ innovation.left)
 
 
-@pytest.mark.parametrize(("left", "value"), [(-0.3, 0.4), (-0.05, 0.4), (0.2, 0.4), (0.3, 0.0), (-0.3, 0.0)])
-def test_a_strength_cannot_become_less_than_nothing(left: float, value: float) -> None:
+@pytest.mark.parametrize("most", [np.inf, 0.6])
+@pytest.mark.parametrize(("left", "value"), [(-0.3, 0.4), (-0.05, 0.4), (0.2, 0.4), (0.3, 0.0), (-0.3, 0.0), (0.9, 0.0)])
+def test_a_strength_stays_within_its_limits(left: float, value: float, most: float) -> None:
     """The ratio is that of the likelihoods of all days, by quadrature over strength and change that leave something.
 
-    What is absent is 0 and can only grow.
+    What is absent is 0 and can only grow; what is a share stays one.
     """
     begin, deviation, n_day, present = 4, 0.5, 8, value > 0.0
     days = made(6, n_day)
     days.slopes[:, :, 2] = 0.0
-    own = replace(days.columns[0], value=value, present=present, is_positive=True)
+    own = replace(days.columns[0], value=value, present=present, limits=(0.0, most))
     days = replace(days, columns=(own, *days.columns[1:]))
     days.errors[begin:] -= (left - value) * days.slopes[begin:, :, 0]
     filtered, what = DayFilter(days, deviation**2 * np.eye(N_ERROR), walk=0.0), sought(days)
@@ -145,7 +147,7 @@ def test_a_strength_cannot_become_less_than_nothing(left: float, value: float) -
                   / deviation**2)[:, None] * prior  # fmt: skip
     means = []
     for size in (1.0, 0.3, 0.1, 0.03):
-        change = np.exp(-0.5 * (p / size) ** 2) * (value + present * v + p > 0.0)
+        change = np.exp(-0.5 * (p / size) ** 2) * (value + present * v + p > 0.0) * (value + present * v + p < most)
         chance = np.sum(seen * change) / np.sum(seen * np.exp(-0.5 * (p / size) ** 2))
         density = np.exp(-0.5 * (p[0] / size) ** 2).sum()
         means.append(np.sum(prior * change * np.exp(log_likelihood)) / density / chance / none)
@@ -223,8 +225,7 @@ def test_a_slow_change_is_the_sum_of_its_parts() -> None:
 
 def test_quiet_days_are_quiet() -> None:
     course = follow(made(8, 160), REFERENCE)
-    assert course.events == ()
-    assert course.withdrawn == ()
+    assert (course.events, course.withdrawn) == ((), ())
     assert np.isfinite(course.evidence[REFERENCE:]).all()
     assert np.isnan(course.evidence[:REFERENCE]).all()
 
@@ -233,8 +234,7 @@ def test_quiet_days_are_quiet() -> None:
 def test_a_few_days_unlike_others_are_no_alarm_or_withdrawn(over: int) -> None:
     """The evidence is 13.3 on day 63, 17.6 and 20.6 on the next two, and 12 no longer on day 66 where the fifth was the last."""
     course = follow(made(3, 120, 1.0, start=60, end=60 + over), REFERENCE)
-    assert course.events == ()
-    assert course.withdrawn == (() if over < 6 else (66,))
+    assert (course.events, course.withdrawn) == ((), () if over < 6 else (66,))
     assert np.nanmax(course.evidence) > course.threshold
 
 
