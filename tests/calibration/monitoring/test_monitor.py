@@ -180,8 +180,11 @@ def test_a_window_is_sought_on_one_side_and_across(quiet: Case) -> None:
     models = ModelComparison(quiet, ModelSettings(dx=2.0), [Interval(quiet.stamps[0], quiet.stamps[200])])
     normalisation = fit_normalisation(quiet)
     one_side, across = (_of_seasons(quiet, normalisation, across=a) for a in (False, True))
-    both, *each = (days_of_case(replace(models, drivers=drivers), {}, {}, ["window_opening"], None, further)
-                   for drivers, further in ((one_side, across), (one_side, None), (across, None)))  # fmt: skip
+    of_drivers = []
+    for drivers, further in ((one_side, across), (one_side, None), (across, None)):
+        models.drivers = drivers
+        of_drivers.append(days_of_case(models, {}, {}, ["window_opening"], None, further))
+    both, *each = of_drivers
     name = f"opened_window_area@{quiet.building.zone_names[0]}"
     found = [np.array([c.name == name for c in days.columns]) for days in (both, *each)]
     assert [int(f.sum()) for f in found] == [2, 1, 1]
