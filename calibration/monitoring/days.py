@@ -50,7 +50,7 @@ _SECANTS = {"capacity_lost": (0.2, 0.6), "door_airflow": (0.1,)}
 #: a hall that nothing heats (seeds 21, 29, 69 and 77 of the houses of ``benchmarks/monitoring.py``).
 _ELSEWHERE, _GAINS = "internal_gain_unserved_share", ("internal_gain", "internal_gain_at_home", "base_load")
 
-#: Area of a window, through which wind blows where doors are open: many times what it exchanges on one side of a room.
+#: Area of a window, which air passes by one of several laws.
 _WINDOW = "opened_window_area"
 
 #: Strength of a clock that is wrong by an hour: weather that is moved tells it, sun and all, and not its tangent.
@@ -97,8 +97,8 @@ class Column:
     present : bool
         Whether the model has it, or the effect that it belongs to.
     limits : tuple of float
-        Least and most that a strength can be, infinite where nothing limits it: no leak is less than nothing, and no
-        terminal loses more than all that it can give [parameter unit].
+        Least and most that a strength can be, infinite where nothing limits it: no leak is less than nothing, no
+        terminal loses more than all that it can give, no meter errs by less than -1 of what it reads [parameter unit].
     """
 
     name: str
@@ -164,7 +164,7 @@ def days_of_case(
     values: Mapping[str, float],
     candidates: Sequence[str],
     moved: Mapping[float, ModelComparison] | None = None,
-    across: InputProvider | None = None,
+    draughts: Sequence[InputProvider] = (),
     progress: Progress | None = None,
 ) -> Days:
     """Run the model over all the telemetry, with the sensitivities to all that may be or change.
@@ -182,8 +182,8 @@ def days_of_case(
     moved : mapping of float to ModelComparison, optional
         The case with its weather said so much later [h], twice, which says what a wrong clock does; none where the
         weather's clock is not watched.
-    across : InputProvider, optional
-        The case with air that leaves by another way than it came in; none where windows are open on one side only.
+    draughts : sequence of InputProvider
+        The case with windows that air passes by another law, each of which is sought, too.
     progress : callable, optional
         Called with stage, done, total.
 
@@ -195,8 +195,8 @@ def days_of_case(
     built = models.build({**effects, **{e: () for e in candidates if e not in effects}})
     theta = built.theta(values)
     clocks = {hours: replay_inputs(m.case, built.network, m.drivers) for hours, m in (moved or {}).items()}
-    draught = None if across is None else replay_inputs(models.case, built.network, across)
-    replay = _Replay(models, built, theta, clocks, draught)
+    by_law = [replay_inputs(models.case, built.network, drivers) for drivers in draughts]
+    replay = _Replay(models, built, theta, clocks, by_law)
     own, dates = built.network.parameters, replay.dates
     by = [*range(len(theta)), *replay.further]
     errors, slopes = np.full((len(dates), *replay.shape), np.nan), np.zeros((len(dates), *replay.shape, len(by)))
@@ -262,10 +262,10 @@ class _Replay:
 
     def __init__(
         self, models: ModelComparison, built: Built, theta: FloatArray, moved: Mapping[float, Inputs],
-        draught: Inputs | None,
+        draughts: Sequence[Inputs],
     ) -> None:  # fmt: skip
         self.built, self.theta, self.spin_up = built, theta, models.settings.spin_up_seconds
-        self.moved, self.draught = moved, draught
+        self.moved, self.draughts = moved, draughts
         # a basis of this θ alone interpolates tangents too, as in a screening
         self.model = reduced_model(built.grid, [theta], shifts=SHIFTS)
         self.problem = models.problem(built, theta)
@@ -286,13 +286,12 @@ class _Replay:
         """Parameters that have further derivatives, once for each."""
         own = self.built.network.parameters
         secants = [i for i, p in enumerate(own) for _ in _SECANTS.get(p.base, ())[1:]]
-        return secants + self._everywhere + self._windows
+        return secants + self._everywhere + self._windows * len(self.draughts)
 
     @property
     def _windows(self) -> list[int]:
-        """Areas of windows, where air may leave by another way than it came in."""
-        own = self.built.network.parameters
-        return [i for i, p in enumerate(own) if p.base == _WINDOW] if self.draught is not None else []
+        """Areas of windows."""
+        return [i for i, p in enumerate(self.built.network.parameters) if p.base == _WINDOW]
 
     @property
     def _everywhere(self) -> list[int]:
@@ -320,8 +319,8 @@ class _Replay:
             alike = np.where(shares, 1.0, self.theta)
             before = self._run(part, alike, self.built.inputs)[0]
             further += [self._secant(part, before, i, 1.0, alike) for i in everywhere]
-        if self.draught is not None:
-            by_area = self._run(part, self.theta, self.draught, slopes=True)[1]
+        for inputs in self.draughts:
+            by_area = self._run(part, self.theta, inputs, slopes=True)[1]
             further += [by_area[..., i] for i in self._windows]
         scale = np.append(self.scale, self.scale[self.further])
         return errors, np.stack([*np.moveaxis(slopes, -1, 0), *further], axis=-1) * scale
@@ -390,11 +389,10 @@ def _column(p: Parameter, value: float, present: bool) -> Column:
     zonal = effect_of(p.effect).zonal if p.effect is not None else False
     zones = zones_of([p.member]) if zonal and p.member is not None else ()
     changes = is_strength(p.name, p.effect) and p.effect in (*MAY_CHANGE, *NO_CAUSE)
-    is_positive = changes and p.lower == 0.0
-    is_share = is_positive and p.unit == "1" and p.upper <= 1.0
+    least = 0.0 if p.lower == 0.0 else -1.0 if p.unit == "1" else -np.inf
+    most = 1.0 if p.unit == "1" and least == 0.0 else np.inf
     return Column(
         p.name, p.unit, p.effect, zones, p.prior_deviation, p.prior_deviation * (1.0 if present else _SELDOM),
         p.transform(p.start) - p.transform(value), float(value),
-        may_change=changes, present=present,
-        limits=(0.0 if is_positive else -np.inf, 1.0 if is_share else np.inf),
+        may_change=changes, present=present, limits=(least, most) if changes else (-np.inf, np.inf),
     )  # fmt: skip

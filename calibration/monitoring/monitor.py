@@ -27,6 +27,7 @@ from thermal.case.case import Case
 from thermal.effects.catalogue import CATALOGUE
 from thermal.inputs.normalisation import Normalisation, fit_normalisation
 from thermal.inputs.provider import InputProvider, telemetry_inputs
+from thermal.inputs.windows import WindowLaw, across, on_one_side, steady
 
 #: First weeks that are taken for sound by default, and the fewest days that can be [d].
 REFERENCE_DAYS, _FEWEST_DAYS = 42, 14
@@ -247,8 +248,9 @@ def monitor(
     candidates = [e for e in CATALOGUE if e not in untestable and not (set(CATALOGUE[e].requires) - set(effects))]
     hour = max(1, round(3600.0 / case.step)) * case.step / 3600.0  # whole steps
     moved = {h: _moved(models, h) for h in (-hour, hour)} if "clock_shift" in {*effects, *candidates} else None
-    across = _of_seasons(case, drivers.normalisation, across=True) if drivers.gives("through_windows") else None
-    days = days_of_case(models, effects, values, [*candidates, *NO_CAUSE], moved, across, progress)
+    laws = (across, steady) if drivers.gives("through_windows") else ()
+    draughts = [_of_seasons(case, drivers.normalisation, law) for law in laws]
+    days = days_of_case(models, effects, values, [*candidates, *NO_CAUSE], moved, draughts, progress)
     course = follow(days, chosen.reference_days, chosen.ruled_out, progress)
     watched = {e: r for e, r in untestable.items() if e in MAY_CHANGE}
     source = Path(parameters).name if parameters is not None else "fitted to the reference days"
@@ -258,10 +260,8 @@ def monitor(
     )  # fmt: skip
 
 
-def _of_seasons(case: Case, normalisation: Normalisation, across: bool = False) -> InputProvider:
+def _of_seasons(case: Case, normalisation: Normalisation, law: WindowLaw = on_one_side) -> InputProvider:
     """Read the inputs, and let a window of every zone stand open in them, so that its strength is the area that does.
-
-    With `across`, one that air does not leave by.
 
     Air leaves at what is usual for the season: the mean of the week before at the same time of the day. Temperatures of
     the day itself would hand the model the errors that it is to be judged by.
@@ -273,7 +273,7 @@ def _of_seasons(case: Case, normalisation: Normalisation, across: bool = False) 
         at_this_time = zone.groupby([stamps.hour, stamps.minute, stamps.second])
         week = at_this_time.transform(lambda of: of.shift().rolling(_SEASON, min_periods=1).mean())
         seasonal.usual = np.where(week.notna(), week, seasonal.usual)
-        drivers.through_windows = seasonal.across_windows if across else seasonal.through_windows
+        drivers.through_windows = seasonal.windows_by(law)
     drivers.largest_heat = np.maximum(drivers.largest_heat, _largest_heat(case))
     return drivers
 

@@ -12,7 +12,7 @@ after them by its estimate v̂ with the variance P and what it has made of the c
 
     Φ((v̂ + (1 - F) m) / (P + (1 - F)² q)^½) / Φ(u / (σ² + s²)^½)                                               (M4)
 
-and likewise where v + p, a share, cannot be more than 1.
+and likewise where v + p is bounded elsewhere, as a share by 1.
 
 The sum of the ratios over all τ, weighted over all that may change, is the e-detector of Shiryaev and Roberts, and an
 alarm where it exceeds A comes on average after A days or more while nothing has changed (Shin, Ramdas and Rinaldo 2024,
@@ -184,8 +184,8 @@ class Watch:
         self._score, self._information = np.zeros((0, k)), np.zeros((0, k))
         self._top = np.zeros((0, k + len(self.ends)))
         self._deviation = np.array([what.columns[i].deviation for i in what.which])
-        self._most = np.array([what.columns[i].limits[1] for i in what.which])
-        self._bounded = np.array([what.columns[i].limits[0] == 0.0 for i in what.which], dtype=bool)
+        self._least, self._most = np.array([what.columns[i].limits for i in what.which]).reshape(-1, 2).T
+        self._bounded = np.isfinite(self._least)
         self._parts = [self._parts_of(i, n_state, found) for i in what.which]
         self._room, self._unsure, self._kept = np.zeros((0, k)), np.zeros((0, k)), np.ones((0, k))
         self._left = np.zeros(k), np.zeros(k)
@@ -254,7 +254,7 @@ class Watch:
         return np.array(own + [first + k for k, c in enumerate(found) if c.column in same and c.end is None], dtype=int)
 
     def _strengths(self, state: State) -> tuple[FloatArray, FloatArray]:
-        """Mean and variance of the strengths that cannot be less than 0, by the filter; 0 of what is absent."""
+        """Mean and variance of the strengths that have limits, by the filter; 0 of what is absent."""
         mean, variance = np.zeros(len(self._parts)), np.zeros(len(self._parts))
         for i in np.flatnonzero(self._bounded):
             column, parts = self.what.columns[self.what.which[i]], self._parts[i]
@@ -287,10 +287,12 @@ class Watch:
             spread = size * self._deviation[at]
             sharp = information + spread**-2.0
             ratio = 0.5 * score**2 / sharp - 0.5 * np.log1p(information * spread**2)
-            kept, (left, unsure), most = self._kept[:, at], self._left, self._most[at]
-            after = _log_within(most, left[at] + kept * score / sharp, unsure[at] + kept**2 / sharp)
-            before = _log_within(most, self._room[:, at], spread**2 + self._unsure[:, at])
-            parts.append(ratio + np.where(self._bounded[at], after - before, 0.0))
+            kept, (left, unsure), room = self._kept[:, at], self._left, self._room[:, at]
+            bounded, most = self._bounded[at], (self._most - self._least)[at]
+            least = np.where(bounded, self._least[at], 0.0)
+            after = _log_within(most, left[at] + kept * score / sharp - least, unsure[at] + kept**2 / sharp)
+            before = _log_within(most, room - least, spread**2 + self._unsure[:, at])
+            parts.append(ratio + np.where(bounded, after - before, 0.0))
         begun = logsumexp(np.array(parts), axis=0) - np.log(len(parts))
         lost = np.concatenate([np.zeros(k), [size for _, size in self.ends]])[which]
         return np.asarray(np.where(which < k, begun, -lost * score - 0.5 * lost**2 * information))

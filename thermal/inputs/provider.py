@@ -6,7 +6,7 @@ of a model what it is made of (`Signal.inputs`), so that nobody has to try.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from functools import cached_property
 
 import numpy as np
@@ -26,7 +26,7 @@ from thermal.inputs.normalisation import (
     supply_air,
 )
 from thermal.inputs.sun import Sun, estimated_sun, suffices, sun_of
-from thermal.inputs.windows import across, on_one_side
+from thermal.inputs.windows import WindowLaw, on_one_side
 
 #: Stefan-Boltzmann constant [W/m2/K4].
 STEFAN_BOLTZMANN = 5.670374419e-8
@@ -345,14 +345,16 @@ class InputProvider:
     @cached_property
     def through_windows(self) -> FloatArray:
         """Air that passes an open window, times how much colder it is outdoor: shape (n_time, n_zone) [K*m/s]."""
-        return self._through(on_one_side)
+        return self.windows_by(on_one_side)
 
-    @property
-    def across_windows(self) -> FloatArray:
-        """The same where air leaves by another way than it came in."""
-        return self._through(across)
+    def windows_by(self, law: WindowLaw) -> FloatArray:
+        """Give the same by another law, shape (n_time, n_zone) [K*m/s].
 
-    def _through(self, law: Callable[[FloatArray, FloatArray], FloatArray]) -> FloatArray:
+        Parameters
+        ----------
+        law : callable
+            Of `thermal.inputs.windows`.
+        """
         difference = self.outdoor[:, None] - self.usual
         wind = self.wind if self.gives("wind") else np.full(len(self.stamps), _USUAL_WIND)
         return np.asarray(law(wind[:, None], difference) * difference)

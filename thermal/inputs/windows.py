@@ -1,10 +1,15 @@
-"""Air that passes an open window, by wind and warmth: on one side of a room, or across it."""
+"""Air that passes an open window: by wind and warmth on one side of a room or across it, or whatever they are."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 
 from thermal._types import FloatArray
+
+#: Flow per area [m/s] by the wind's speed [m/s] and the difference of the temperatures [K].
+WindowLaw = Callable[[FloatArray, FloatArray], FloatArray]
 
 #: Standard acceleration of free fall [m/s2].
 _GRAVITY = 9.80665
@@ -15,6 +20,9 @@ _HEIGHT, _TEMPERATURE = 1.0, 285.0
 #: Air that a wind at an angle drives through an opening over the wind's speed there, which among houses is half of what
 #: a station on a field of 10 m measures; and discharge of an opening [-].
 _BY_WIND, _DISCHARGE = 0.3 * 0.5, 0.65
+
+#: Flow per area that is usual in winter, between that on one side and that across [m/s].
+_USUAL = 0.3
 
 
 def on_one_side(wind: FloatArray, difference: FloatArray) -> FloatArray:
@@ -57,3 +65,21 @@ def across(wind: FloatArray, difference: FloatArray) -> FloatArray:
     """
     stack = _DISCHARGE**2 * 2.0 * _GRAVITY * 0.5 * _HEIGHT * np.abs(difference) / _TEMPERATURE
     return np.asarray(np.sqrt((_BY_WIND * wind) ** 2 + stack))
+
+
+def steady(wind: FloatArray, difference: FloatArray) -> FloatArray:
+    """Flow per area that neither wind nor warmth changes: a sheltered window, or a fan [m/s].
+
+    Parameters
+    ----------
+    wind : ndarray
+        Speed [m/s].
+    difference : ndarray
+        Of the temperatures [K].
+
+    Examples
+    --------
+    >>> float(steady(np.array(4.0), np.array(10.0)))
+    0.3
+    """
+    return np.full(np.broadcast(wind, difference).shape, _USUAL)

@@ -23,6 +23,7 @@ from thermal.case.case import Case
 from thermal.data import load_bundled_case
 from thermal.errors import EffectError
 from thermal.inputs.normalisation import fit_normalisation
+from thermal.inputs.windows import across, on_one_side, steady
 from thermal.pilot.twin import TwinRanges, TwinSettings, generate_twin
 
 DAYS, REFERENCE, CHANGED = 42, 21, 31
@@ -175,21 +176,19 @@ def _errors_and_clock(
     return days.errors, days.slopes[..., number]
 
 
-def test_a_window_is_sought_on_one_side_and_across(quiet: Case) -> None:
+def test_a_window_is_sought_by_each_law(quiet: Case) -> None:
     """Each derivative is that of a model whose windows let as much air through."""
     models = ModelComparison(quiet, ModelSettings(dx=2.0), [Interval(quiet.stamps[0], quiet.stamps[200])])
     normalisation = fit_normalisation(quiet)
-    one_side, across = (_of_seasons(quiet, normalisation, across=a) for a in (False, True))
-    of_drivers = []
-    for drivers, further in ((one_side, across), (one_side, None), (across, None)):
+    of_laws, own = [_of_seasons(quiet, normalisation, law) for law in (on_one_side, across, steady)], []
+    for drivers, further in ((of_laws[0], of_laws[1:]), *((each, ()) for each in of_laws)):
         models.drivers = drivers
-        of_drivers.append(days_of_case(models, {}, {}, ["window_opening"], None, further))
-    both, *each = of_drivers
-    name = f"opened_window_area@{quiet.building.zone_names[0]}"
-    found = [np.array([c.name == name for c in days.columns]) for days in (both, *each)]
-    assert [int(f.sum()) for f in found] == [2, 1, 1]
-    for number, (days, of) in enumerate(zip(each, found[1:], strict=True)):
-        assert both.slopes[..., found[0]][..., number] == pytest.approx(days.slopes[..., of][..., 0])
+        days = days_of_case(models, {}, {}, ["window_opening"], None, further)
+        name = f"opened_window_area@{quiet.building.zone_names[0]}"
+        own.append(days.slopes[..., [c.name == name for c in days.columns]])
+    assert [of.shape[-1] for of in own] == [3, 1, 1, 1]
+    assert own[0] == pytest.approx(np.concatenate(own[1:], axis=-1))
+    assert np.abs(own[2]).max() > 1.1 * np.abs(own[1]).max()
 
 
 def test_heat_that_begins_everywhere_is_told_where_a_room_has_no_device(quiet: Case) -> None:
