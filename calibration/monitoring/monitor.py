@@ -22,7 +22,7 @@ from calibration.monitoring.course import Course, Event, follow
 from calibration.monitoring.days import MAY_CHANGE, NO_CAUSE, USUAL, Days, days_of_case
 from calibration.progress import Progress
 from calibration.results import Axes, Result, plain
-from thermal._types import BoolArray, FloatArray
+from thermal._types import BoolArray, FloatArray, IntArray
 from thermal.case.case import Case
 from thermal.effects.catalogue import CATALOGUE
 from thermal.inputs.normalisation import Normalisation, fit_normalisation
@@ -228,7 +228,7 @@ def monitor(
     given = ModelSettings(**read_settings(parameters)) if parameters is not None else ModelSettings()
     made = replace(given, effects={}, dx=chosen.dx if chosen.dx is not None else given.dx)
     models = ModelComparison(case, made, [reference], horizon=chosen.horizon)
-    drivers = _of_seasons(case, fit_normalisation(case, [(reference.start, reference.end)]))
+    drivers = _of_seasons(case, fit_normalisation(case, [(reference.start, reference.end)]), chosen.horizon)
     models.drivers = drivers
     untestable = models.untestable()
     said = reasons_of(chosen.known or (), chosen.ruled_out, untestable)
@@ -249,7 +249,7 @@ def monitor(
     hour = max(1, round(3600.0 / case.step)) * case.step / 3600.0  # whole steps
     moved = {h: _moved(models, h) for h in (-hour, hour)} if "clock_shift" in {*effects, *candidates} else None
     laws = (across, steady) if drivers.gives("through_windows") else ()
-    draughts = [_of_seasons(case, drivers.normalisation, law) for law in laws]
+    draughts = [_of_seasons(case, drivers.normalisation, chosen.horizon, law) for law in laws]
     days = days_of_case(models, effects, values, [*candidates, *NO_CAUSE], moved, draughts, progress)
     course = follow(days, chosen.reference_days, chosen.ruled_out, progress)
     watched = {e: r for e, r in untestable.items() if e in MAY_CHANGE}
@@ -260,11 +260,14 @@ def monitor(
     )  # fmt: skip
 
 
-def _of_seasons(case: Case, normalisation: Normalisation, law: WindowLaw = on_one_side) -> InputProvider:
+def _of_seasons(
+    case: Case, normalisation: Normalisation, horizon: str, law: WindowLaw = on_one_side
+) -> InputProvider:
     """Read the inputs, and let a window of every zone stand open in them, so that its strength is the area that does.
 
-    Air leaves at what is usual for the season: the mean of the week before at the same time of the day. Temperatures of
-    the day itself would hand the model the errors that it is to be judged by.
+    Air leaves at what was measured where a run begins, and goes on as is usual for the season: as the mean of the week
+    before at the same time of the day does. Later temperatures of a run would hand the model the errors that it is to
+    be judged by, and the season alone does not know that a room with an open window has become cold.
     """
     drivers, seasonal = telemetry_inputs(case, normalisation), telemetry_inputs(case, normalisation)
     drivers.openings = np.ones_like(drivers.openings)
@@ -272,10 +275,22 @@ def _of_seasons(case: Case, normalisation: Normalisation, law: WindowLaw = on_on
         zone, stamps = case.zone_temperatures(), case.stamps
         at_this_time = zone.groupby([stamps.hour, stamps.minute, stamps.second])
         week = at_this_time.transform(lambda of: of.shift().rolling(_SEASON, min_periods=1).mean())
-        seasonal.usual = np.where(week.notna(), week, seasonal.usual)
+        usual = week.where(week.notna(), seasonal.usual)
+        begin = _begin_of_run(case, horizon)
+        seasonal.usual = np.asarray(usual + (zone - usual).fillna(0.0).to_numpy()[begin])
         drivers.through_windows = seasonal.windows_by(law)
     drivers.largest_heat = np.maximum(drivers.largest_heat, _largest_heat(case))
     return drivers
+
+
+def _begin_of_run(case: Case, horizon: str) -> IntArray:
+    """Row at which the run that each row belongs to begins, shape (n_time,): values stand for the step before."""
+    before = case.stamps - pd.Timedelta(seconds=case.step)
+    seconds = np.asarray(before.hour * 3600 + before.minute * 60 + before.second)
+    run = seconds // (horizon_steps(horizon, case.step) * case.step)
+    first = np.flatnonzero(np.append(True, (np.diff(run) != 0) | np.asarray(before.date[1:] != before.date[:-1])))
+    length = np.diff(np.append(first, len(before)))
+    return np.repeat(np.maximum(first - 1, 0), length)
 
 
 def _largest_heat(case: Case) -> FloatArray:
@@ -289,7 +304,7 @@ def _largest_heat(case: Case) -> FloatArray:
 def _moved(models: ModelComparison, hours: float) -> ModelComparison:
     """Move the weather of a case."""
     moved = replace(models, case=models.case.with_weather_moved(hours))
-    moved.drivers = _of_seasons(moved.case, models.drivers.normalisation)
+    moved.drivers = _of_seasons(moved.case, models.drivers.normalisation, models.horizon)
     return moved
 
 
