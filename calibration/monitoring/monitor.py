@@ -275,9 +275,9 @@ def _of_seasons(
         zone, stamps = case.zone_temperatures(), case.stamps
         at_this_time = zone.groupby([stamps.hour, stamps.minute, stamps.second])
         week = at_this_time.transform(lambda of: of.shift().rolling(_SEASON, min_periods=1).mean())
-        usual = week.where(week.notna(), seasonal.usual)
-        begin = _begin_of_run(case, horizon)
-        seasonal.usual = np.asarray(usual + (zone - usual).fillna(0.0).to_numpy()[begin])
+        usual = np.where(week.notna(), week, seasonal.usual)
+        unlike = np.nan_to_num(zone.to_numpy() - usual)
+        seasonal.usual = usual + unlike[_begin_of_run(case, horizon)]
         drivers.through_windows = seasonal.windows_by(law)
     drivers.largest_heat = np.maximum(drivers.largest_heat, _largest_heat(case))
     return drivers

@@ -189,6 +189,7 @@ class Watch:
         self._parts = [self._parts_of(i, n_state, found) for i in what.which]
         self._room, self._unsure, self._kept = np.zeros((0, k)), np.zeros((0, k)), np.ones((0, k))
         self._left = np.zeros(k), np.zeros(k)
+        self._square, self._seen = np.zeros((0, 1)), np.zeros((0, 1))
         self.log_ratio = np.zeros((0, k + len(self.ends)))
 
     def take(
@@ -222,6 +223,8 @@ class Watch:
         white = solve_triangular(innovation.root, flat, lower=True)
         self._score += (innovation.white @ white).reshape(t, k)
         self._information += (white**2).sum(axis=0).reshape(t, k)
+        self._square += innovation.white @ innovation.white
+        self._seen += innovation.white.size
         self._left = self._strengths(states[1])
         for i in np.flatnonzero(self._bounded):
             self._kept[:, i] = 1.0 - self._moved[self._parts[i], :, i].sum(axis=0)
@@ -271,7 +274,7 @@ class Watch:
         self._moved = np.concatenate([self._moved[:, kept], new], axis=1)
         room, unsure = self._strengths(state)
         begun = {"_room": room, "_unsure": unsure, "_kept": np.ones_like(room)}
-        for name in ("_score", "_information", "_top", "log_ratio", "_room", "_unsure", "_kept"):
+        for name in ("_score", "_information", "_top", "log_ratio", "_room", "_unsure", "_kept", "_square", "_seen"):
             held = getattr(self, name)
             setattr(self, name, np.vstack([held[kept], begun.get(name, np.zeros(held.shape[1]))]))
 
@@ -297,6 +300,12 @@ class Watch:
         lost = np.concatenate([np.zeros(k), [size for _, size in self.ends]])[which]
         return np.asarray(np.where(which < k, begun, -lost * score - 0.5 * lost**2 * information))
 
+    def _misfit(self, row: int, which: int) -> float:
+        """Mean square of what a change since a start leaves of the innovations [-]."""
+        at = int(self._place(np.array([which]))[0])
+        explained = self._score[row, at] ** 2 / max(self._information[row, at], 1e-300)
+        return float((self._square[row, 0] - explained) / max(self._seen[row, 0], 1.0))
+
     def _place(self, which: IntArray) -> IntArray:
         """Place among what is sought of changes and ends."""
         return np.array([*range(self.what.which.size), *(i for i, _ in self.ends)], dtype=np.int64)[which]
@@ -313,9 +322,10 @@ class Watch:
         with np.errstate(divide="ignore"):
             weight = np.log(np.concatenate([(1.0 - share) * self.what.weight, ends]))
         told = (self.log_ratio - np.maximum(0.0, self._top - self.cap) + weight)[begun]
-        likeliest = np.argmax(logsumexp(told, axis=0))
+        likeliest = int(np.argmax(logsumexp(told, axis=0)))
         which, k = np.arange(weight.size), self.what.which.size
-        pair = np.maximum(varies, varies[likeliest])
+        since = int(np.flatnonzero(begun)[np.argmax(told[:, likeliest])])
+        pair = np.maximum(np.maximum(varies, varies[likeliest]), self._misfit(since, likeliest))
         beside = logsumexp(self._ratios(np.full_like(which, likeliest), pair)[begun], axis=0)
         shows = np.log(-np.expm1(-np.maximum(1e-12, self.log_ratio[begun].max(axis=0))))
         ratios = self._ratios(which, pair)[begun]
