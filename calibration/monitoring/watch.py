@@ -231,7 +231,7 @@ class Watch:
         before = self.log_ratio
         which = np.arange(self.log_ratio.shape[1])
         varies = self.dispersion.at(day)[self._place(which)]
-        self.log_ratio = self._ratios(which, varies)
+        self.log_ratio = self._ratios(which, np.maximum(varies, self._left_by(self._place(which))))
         self._top = np.maximum(self._top, self.log_ratio - before)
         return self._judge(varies, self.starts <= (day if noticed is None else noticed))
 
@@ -281,7 +281,7 @@ class Watch:
     def _ratios(self, which: IntArray, varies: FloatArray) -> FloatArray:
         """Logarithms of the likelihood ratios by start, of changes and, after them, ends of those that were found.
 
-        Each with a ratio of variances of its own.
+        Each with a ratio of variances of its own, by change or by start and change.
         """
         at, k = self._place(which), self.what.which.size
         score, information = self._score[:, at] / varies, self._information[:, at] / varies
@@ -300,11 +300,10 @@ class Watch:
         lost = np.concatenate([np.zeros(k), [size for _, size in self.ends]])[which]
         return np.asarray(np.where(which < k, begun, -lost * score - 0.5 * lost**2 * information))
 
-    def _misfit(self, row: int, which: int) -> float:
-        """Mean square of what a change since a start leaves of the innovations [-]."""
-        at = int(self._place(np.array([which]))[0])
-        explained = self._score[row, at] ** 2 / max(self._information[row, at], 1e-300)
-        return float((self._square[row, 0] - explained) / max(self._seen[row, 0], 1.0))
+    def _left_by(self, which: IntArray) -> FloatArray:
+        """Mean square of what changes leave of the innovations since each start, shape (n_start, n) [-]."""
+        explained = self._score[:, which] ** 2 / np.maximum(self._information[:, which], 1e-300)
+        return np.asarray((self._square - explained) / np.maximum(self._seen, 1.0))
 
     def _place(self, which: IntArray) -> IntArray:
         """Place among what is sought of changes and ends."""
@@ -313,8 +312,9 @@ class Watch:
     def _judge(self, varies: FloatArray, begun: BoolArray) -> Alarm:
         """Weigh all changes and starts that there were when an alarm was raised.
 
-        Names are told apart in pairs with the likeliest change, each pair by one noise, the larger of the two: a
-        change whose direction varies a little more from day to day is no less likely to be the name. What is no
+        Names are told apart in pairs with the likeliest change, each pair by one noise, the larger of the two and of
+        what the likeliest leaves: a change whose direction varies a little more from day to day is no less likely to be
+        the name, and where no change is as the model says, a little more of a large evidence names none. What is no
         likelier than nothing by its own noise is no name, though a large noise makes all alike.
         """
         share = _ENDS if self.ends else 0.0
@@ -325,7 +325,8 @@ class Watch:
         likeliest = int(np.argmax(logsumexp(told, axis=0)))
         which, k = np.arange(weight.size), self.what.which.size
         since = int(np.flatnonzero(begun)[np.argmax(told[:, likeliest])])
-        pair = np.maximum(np.maximum(varies, varies[likeliest]), self._misfit(since, likeliest))
+        left = self._left_by(self._place(np.array([likeliest])))[since, 0]
+        pair = np.maximum(np.maximum(varies, varies[likeliest]), left)
         beside = logsumexp(self._ratios(np.full_like(which, likeliest), pair)[begun], axis=0)
         shows = np.log(-np.expm1(-np.maximum(1e-12, self.log_ratio[begun].max(axis=0))))
         ratios = self._ratios(which, pair)[begun]
