@@ -246,9 +246,9 @@ def test_evidence_of_twice_the_threshold_does_not_wait(monkeypatch: pytest.Monke
 
 
 def dipping(n_day: int) -> Days:
-    """Make a change on day 60 with four days that say the opposite: 22.5 on day 66, 5.5, 7.7, 9.4, 11.6 on 70 to 73."""
+    """Make a change on day 60 with three days that say the opposite: 22.5 on day 66, 4.4, 5.4, 7.5, 8.9, 10.9 on 69 to 73."""
     days, quiet = made(3, n_day, 1.0, start=60), made(3, n_day)
-    days.errors[67:71] = 2.0 * quiet.errors[67:71] - days.errors[67:71]
+    days.errors[67:70] = 2.0 * quiet.errors[67:70] - days.errors[67:70]
     return days
 
 
