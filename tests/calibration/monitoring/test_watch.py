@@ -12,8 +12,8 @@ from calibration.errors import NotEnoughDataError
 from calibration.monitoring.course import NAMING_DAYS, follow
 from calibration.monitoring.days import ONSET, Column, Days
 from calibration.monitoring.dispersion import Dispersion
-from calibration.monitoring.filter import DayFilter, Found, State, noise_of
-from calibration.monitoring.watch import Watch, sought
+from calibration.monitoring.filter import DayFilter, Found, Innovation, State, noise_of
+from calibration.monitoring.watch import Alarm, Watch, sought
 from thermal._types import FloatArray
 
 N_ERROR, REFERENCE = 6, 30
@@ -33,8 +33,7 @@ def made(seed: int, n_day: int, shift: float = 0.0, start: int = 0, end: int = 1
     columns = (column("valve_leak@A", "valve_leak", True, ("A",)), column("flow_gain@B", "flow_gain", True, ("B",)),
                column("window_u_value", None, False))  # fmt: skip
     errors = 0.5 * rng.standard_normal((n_day, N_ERROR))
-    share = np.clip((np.arange(n_day) - start + 0.5) / max(over, 0.5), 0.0, 1.0)
-    lasts = np.where(np.arange(n_day) < end, share, 0.0)
+    lasts = np.clip((np.arange(n_day) - start + 0.5) / max(over, 0.5), 0.0, 1.0) * (np.arange(n_day) < end)
     # errors are simulated minus measured: what the model lacks takes the sign of its derivative the other way
     errors -= shift * lasts[:, None] * slopes[:, :, 0]
     dates = pd.date_range("2023-01-02", periods=n_day, freq="D", tz="UTC")
@@ -44,6 +43,19 @@ def made(seed: int, n_day: int, shift: float = 0.0, start: int = 0, end: int = 1
 def cut(days: Days, n_day: int) -> Days:
     """Leave the first days."""
     return replace(days, dates=days.dates[:n_day], errors=days.errors[:n_day], slopes=days.slopes[:n_day])
+
+
+def watched(
+    days: Days, filtered: DayFilter, dispersion: Dispersion, state: State, begin: int = 0
+) -> tuple[Watch, Alarm, Innovation]:
+    """Watch days from one on; the last day's alarm and innovation."""
+    watch = Watch(sought(days), state.mean.size, dispersion)
+    for day in range(len(days)):
+        before, (state, innovation) = state, filtered.step(state, day)
+        assert innovation is not None
+        if day >= begin:
+            alarm = watch.take(day, days, innovation, (before, state))
+    return watch, alarm, innovation
 
 
 def first_alarms(threshold: float, seeds: range, n_day: int) -> list[float]:
@@ -84,8 +96,7 @@ def test_filter_innovations_are_white_where_days_are() -> None:
 
 
 def test_noise_is_found() -> None:
-    found = np.diag(noise_of(made(2, 200), 200))
-    assert found == pytest.approx(np.full(N_ERROR, 0.25), rel=0.4)
+    assert np.diag(noise_of(made(2, 200), 200)) == pytest.approx(np.full(N_ERROR, 0.25), rel=0.4)
 
 
 def test_noise_is_found_where_no_day_shows_all_errors() -> None:
@@ -100,19 +111,17 @@ def test_noise_is_found_where_no_day_shows_all_errors() -> None:
 
 def test_information_of_a_new_change_is_that_of_least_squares() -> None:
     """On the day of a change score and information are jᵀ V⁻¹ ν and jᵀ V⁻¹ j."""
-    days = made(3, 5)
+    days = made(3, 4)
     filtered, what = DayFilter(days, 0.25 * np.eye(N_ERROR)), sought(days)
-    state = filtered.start()
-    watch = Watch(what, state.mean.size, Dispersion(5, what.which.size))
-    for day in range(4):
-        before, (state, innovation) = state, filtered.step(state, day)
-        assert innovation is not None
-        watch.take(day, days, innovation, (before, state))
-    assert innovation is not None
+    watch, _, innovation = watched(days, filtered, Dispersion(4, what.which.size), filtered.start())
     own = what.shown(days, 3, innovation) * what.shares[0]
     expected = np.linalg.solve(innovation.root @ innovation.root.T, own)
     assert watch._information[-1] == pytest.approx(np.sum(own * expected, axis=0))
     assert watch._score[-1] == pytest.approx(expected.T @ innovation.left)
+    white = np.linalg.solve(innovation.root, own)
+    for number, column in enumerate(white.T):  # what the likeliest size of each leaves
+        left = np.linalg.lstsq(column[:, None], innovation.white, rcond=None)[1]
+        assert watch._left_by(np.arange(what.which.size))[-1, number] == pytest.approx(left[0] / N_ERROR)
 
 
 @pytest.mark.parametrize(("least", "most"), [(0.0, np.inf), (0.0, 0.6), (-0.2, np.inf)])
@@ -131,11 +140,7 @@ def test_a_strength_stays_within_its_limits(left: float, value: float, least: fl
     filtered, what = DayFilter(days, deviation**2 * np.eye(N_ERROR), walk=0.0), sought(days)
     spread = np.diag([own.spread**2, *np.full(len(filtered.start().mean) - 1, 1e-12)])
     state = State(np.zeros(len(spread)), spread)
-    watch = Watch(what, state.mean.size, Dispersion(n_day, what.which.size))
-    for day in range(n_day):
-        before, (state, innovation) = state, filtered.step(state, day)
-        assert innovation is not None
-        watch.take(day, days, innovation, (before, state))
+    watch, *_ = watched(days, filtered, Dispersion(n_day, what.which.size), state)
     p, v = np.meshgrid(np.linspace(-5.0, 5.0, 2001), np.linspace(-1.6, 1.6, 2001))  # v from the value on
     # errors are simulated minus measured: a strength beyond the model's takes the sign of its derivative the other way
     left_of = [(days.errors[d, :3, None, None] + v + p * (d >= begin)) for d in range(n_day)]
@@ -191,23 +196,19 @@ def test_a_change_is_dated_named_sized_and_closed() -> None:
     course = follow(made(7, 160, 1.5, start=70, end=110), REFERENCE)
     assert len(course.events) == 1
     event = course.events[0]
-    assert (event.effect, event.zones) == ("valve_leak", ("A",))
-    assert abs(event.since - 70) <= 1
+    assert (event.effect, event.zones) == ("valve_leak", ("A",)) and abs(event.since - 70) <= 1
     assert event.alarm - 70 <= 8
     assert event.size == pytest.approx(1.5, abs=4.0 * event.deviation)
-    assert event.end is not None
-    assert abs(event.end - 110) <= 2
+    assert event.end is not None and abs(event.end - 110) <= 2
 
 
 def test_a_change_that_comes_over_days_is_dated_and_sized_by_its_course() -> None:
     drift, jump = (made(7, 100, 2.5, start=70, over=over) for over in (12, 0))
     sensor = (column("sensor_bias@A", "sensor_bias", True, ("A",)), *drift.columns[1:])
     event, at_once = (follow(replace(days, columns=sensor), REFERENCE).events[0] for days in (drift, jump))
-    assert (event.effect, event.zones) == ("sensor_bias", ("A",))
-    assert event.over > 0
-    assert abs(event.since - 70) <= 4
+    assert (event.effect, event.zones) == ("sensor_bias", ("A",)) and abs(event.since - 70) <= 4
     assert event.size == pytest.approx(2.5, abs=4.0 * event.deviation)
-    assert at_once.over == 0
+    assert event.over > 0 == at_once.over
 
 
 def test_a_slow_change_is_the_sum_of_its_parts() -> None:
@@ -255,8 +256,7 @@ def dipping(n_day: int) -> Days:
 def test_an_alarm_waits_while_its_evidence_is_neither_enough_nor_gone() -> None:
     course = follow(dipping(120), REFERENCE)
     event = course.events[0]
-    assert (event.effect, event.since, event.alarm) == ("valve_leak", 60, 66)
-    assert event.named == 74
+    assert (event.effect, event.since, event.alarm, event.named) == ("valve_leak", 60, 66, 74)
     assert (course.withdrawn, course.waiting) == ((), None)
 
 
@@ -272,14 +272,8 @@ def test_what_shows_nothing_is_no_name() -> None:
     """A change whose days had a large noise once and have had no signal since is no likelier than nothing."""
     days = made(4, 40, 2.0, start=20)
     days.slopes[1:, :, 1] = 0.0
-    what, filtered = sought(days), DayFilter(days, 0.25 * np.eye(N_ERROR))
-    state = filtered.start()
-    watch = Watch(what, state.mean.size, Noisy(len(days), what.which.size))
-    for day in range(25):
-        before, (state, innovation) = state, filtered.step(state, day)
-        assert innovation is not None
-        if day > 1:
-            alarm = watch.take(day, days, innovation, (before, state))
+    filtered, noisy = DayFilter(days, 0.25 * np.eye(N_ERROR)), Noisy(len(days), sought(days).which.size)
+    _, alarm, _ = watched(cut(days, 25), filtered, noisy, filtered.start(), begin=2)
     assert alarm.share[0] > 0.999
 
 
@@ -318,16 +312,15 @@ def test_a_single_day_raises_no_alarm() -> None:
 
 
 def test_what_is_ruled_out_is_not_named() -> None:
-    course = follow(made(7, 110, 1.5, start=70), REFERENCE, ruled_out=["valve_leak"])
-    assert all(e.effect != "valve_leak" for e in course.events)
+    events = follow(made(7, 110, 1.5, start=70), REFERENCE, ruled_out=["valve_leak"]).events
+    assert all(e.effect != "valve_leak" for e in events)
 
 
 def test_days_without_telemetry_are_passed_over() -> None:
     days = made(7, 110, 1.5, start=70)
     days.errors[60:66] = np.nan
     days.errors[80, :2] = np.nan
-    event = follow(days, REFERENCE).events[0]
-    assert event.effect == "valve_leak"
+    assert follow(days, REFERENCE).events[0].effect == "valve_leak"
 
 
 def test_an_alarm_is_named_where_the_telemetry_ends_without_a_run() -> None:
@@ -376,14 +369,22 @@ def test_names_are_told_apart_by_one_noise() -> None:
     days = made(4, 12, 2.0, start=6)
     days.slopes[:, :, 1] = days.slopes[:, :, 0]
     filtered, what = DayFilter(days, 0.25 * np.eye(N_ERROR)), sought(days)
-    state = filtered.start()
-    watch = Watch(what, state.mean.size, Uneven(len(days), what.which.size))
-    for day in range(len(days)):
-        before, (state, innovation) = state, filtered.step(state, day)
-        assert innovation is not None
-        alarm = watch.take(day, days, innovation, (before, state))
+    watch, alarm, _ = watched(days, filtered, Uneven(len(days), what.which.size), filtered.start())
     assert watch.log_ratio[6, 0] > watch.log_ratio[6, 1] + 1.0
     assert alarm.share == pytest.approx([0.5, 0.5], abs=1e-3)
+
+
+def test_where_no_change_is_as_the_model_says_evidence_names_less() -> None:
+    """Days that vary more once something has changed, whatever it is, are a worse judge between two names."""
+    shares = []
+    for noise in (0.0, 1.0):
+        days = made(4, 12, 1.0, start=6)
+        days.slopes[:, :3, 1] = days.slopes[:, :3, 0]
+        days.slopes[:, 3:, 1] = 0.3
+        days.errors[6:] += noise * np.array([[0.0, 0.0, 0.0, 1.0, -1.0, 0.0]])
+        filtered = DayFilter(days, 0.25 * np.eye(N_ERROR))
+        shares.append(watched(days, filtered, Dispersion(12, 2), filtered.start())[1].share[0])
+    assert 0.5 < shares[1] < shares[0] - 0.05
 
 
 def test_what_may_jump_does_not_age() -> None:
@@ -391,10 +392,9 @@ def test_what_may_jump_does_not_age() -> None:
     days = made(5, 40)
     days.errors[1:] = np.nan
     filtered = DayFilter(days, 0.25 * np.eye(N_ERROR))
-    state, _ = filtered.step(filtered.start(), 0)
+    state = filtered.step(filtered.start(), 0)[0]
     first = np.diag(state.covariance)[:3]
     for day in range(1, 40):
-        state, _ = filtered.step(state, day)
+        state = filtered.step(state, day)[0]
     grown = np.diag(state.covariance)[:3] - first
-    assert grown[:2] == pytest.approx([0.0, 0.0])
-    assert grown[2] == pytest.approx(39 * (0.1 * 0.3) ** 2 / 365.0)
+    assert grown == pytest.approx([0.0, 0.0, 39 * (0.1 * 0.3) ** 2 / 365.0])
