@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 from _peer_environments import peer_rates
 from _table import markdown, write
-from simulator_speed import use_one_thread
+from _threads import use_one_thread
 
 from mpc.environment.environment import ControlEnvironment
 from mpc.environment.office import Office, office_environment, office_plants

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from _table import markdown, write
+from _threads import use_one_thread
 from gymnasium.vector import AutoresetMode
-from simulator_speed import use_one_thread
 
 from mpc.environment.office import office_vector_environment
 from mpc.environment.stable_baselines import StableBaselinesVector

@@ -26,7 +26,7 @@ from _pilot_site import CONTROL_STEP, EFFECTS, OWN, RUN_IN, OwnControl
 from _plant_site import PlantSite
 from _seeds import seed_range
 from _table import markdown, write
-from simulator_speed import use_one_thread
+from _threads import use_one_thread
 
 from mpc.live.audit import AuditLog
 from mpc.live.planner import Planner, forecast_to_dict

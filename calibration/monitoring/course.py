@@ -17,8 +17,8 @@ from calibration.monitoring.watch import Alarm, Sought, Watch, sought
 from calibration.progress import Progress
 from thermal._types import BoolArray, FloatArray
 
-#: Logarithm of the evidence from which there is an alarm [-]. Were days as the filter says, the mean time between false
-#: alarms would be exp(12) days or more; days of a model that lacks physics are not, and 12 was chosen on the
+#: Logarithm of the evidence that makes an alarm where it lasts [-]. Were days as the filter says, the mean time between
+#: false alarms would be exp(12) days or more; days of a model that lacks physics are not, and 12 was chosen on the
 #: development years of ``benchmarks/monitoring.py``, so that quiet ones have less than one alarm a year.
 THRESHOLD = 12.0
 
@@ -164,7 +164,7 @@ def follow(
     progress : callable, optional
         Called with stage, done, total.
     threshold : float
-        Logarithm of the evidence from which there is an alarm [-].
+        Logarithm of the evidence that makes an alarm where it lasts for more than three days, or is twice as large [-].
 
     Raises
     ------

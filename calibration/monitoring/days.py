@@ -50,6 +50,9 @@ _SECANTS = {"capacity_lost": (0.2, 0.6), "door_airflow": (0.1,)}
 #: a hall that nothing heats (seeds 21, 29, 69 and 77 of the houses of ``benchmarks/monitoring.py``).
 _ELSEWHERE, _GAINS = "internal_gain_unserved_share", ("internal_gain", "internal_gain_at_home", "base_load")
 
+#: Limits of strengths beside that what is positive stays so: a share of all that a terminal gives, or a meter reads.
+_LIMITS = {"capacity_lost": (0.0, 1.0), "flow_gain": (-1.0, np.inf)}
+
 #: Area of a window, which air passes by one of several laws.
 _WINDOW = "opened_window_area"
 
@@ -389,10 +392,9 @@ def _column(p: Parameter, value: float, present: bool) -> Column:
     zonal = effect_of(p.effect).zonal if p.effect is not None else False
     zones = zones_of([p.member]) if zonal and p.member is not None else ()
     changes = is_strength(p.name, p.effect) and p.effect in (*MAY_CHANGE, *NO_CAUSE)
-    least = 0.0 if p.lower == 0.0 else -1.0 if p.unit == "1" else -np.inf
-    most = 1.0 if p.unit == "1" and least == 0.0 else np.inf
+    limits = _LIMITS.get(p.base, (0.0 if p.lower == 0.0 else -np.inf, np.inf))
     return Column(
         p.name, p.unit, p.effect, zones, p.prior_deviation, p.prior_deviation * (1.0 if present else _SELDOM),
         p.transform(p.start) - p.transform(value), float(value),
-        may_change=changes, present=present, limits=(least, most) if changes else (-np.inf, np.inf),
+        may_change=changes, present=present, limits=limits if changes else (-np.inf, np.inf),
     )  # fmt: skip

@@ -27,7 +27,7 @@ from thermal.case.case import Case
 from thermal.effects.catalogue import CATALOGUE
 from thermal.inputs.normalisation import Normalisation, fit_normalisation
 from thermal.inputs.provider import InputProvider, telemetry_inputs
-from thermal.inputs.windows import WindowLaw, across, on_one_side, steady
+from thermal.inputs.windows import WindowLaw, across, counted_on_one_side, on_one_side, steady
 
 #: First weeks that are taken for sound by default, and the fewest days that can be [d].
 REFERENCE_DAYS, _FEWEST_DAYS = 42, 14
@@ -248,8 +248,8 @@ def monitor(
     candidates = [e for e in CATALOGUE if e not in untestable and not (set(CATALOGUE[e].requires) - set(effects))]
     hour = max(1, round(3600.0 / case.step)) * case.step / 3600.0  # whole steps
     moved = {h: _moved(models, h) for h in (-hour, hour)} if "clock_shift" in {*effects, *candidates} else None
-    laws = (across, steady) if drivers.gives("through_windows") else ()
-    draughts = [_of_seasons(case, drivers.normalisation, chosen.horizon, law) for law in laws]
+    laws = (across, steady) if "window_opening" in {*effects, *candidates} else ()
+    draughts = [_of_seasons(case, drivers.normalisation, chosen.horizon, counted_on_one_side(law)) for law in laws]
     days = days_of_case(models, effects, values, [*candidates, *NO_CAUSE], moved, draughts, progress)
     course = follow(days, chosen.reference_days, chosen.ruled_out, progress)
     watched = {e: r for e, r in untestable.items() if e in MAY_CHANGE}

@@ -184,6 +184,7 @@ class Watch:
         self._score, self._information = np.zeros((0, k)), np.zeros((0, k))
         self._top = np.zeros((0, k + len(self.ends)))
         self._deviation = np.array([what.columns[i].deviation for i in what.which])
+        self._lost = np.concatenate([np.zeros(k), [size for _, size in self.ends]])
         self._least, self._most = np.array([what.columns[i].limits for i in what.which]).reshape(-1, 2).T
         self._bounded = np.isfinite(self._least)
         self._parts = [self._parts_of(i, n_state, found) for i in what.which]
@@ -231,7 +232,7 @@ class Watch:
         before = self.log_ratio
         which = np.arange(self.log_ratio.shape[1])
         varies = self.dispersion.at(day)[self._place(which)]
-        self.log_ratio = self._ratios(which, np.maximum(varies, self._left_by(self._place(which))))
+        self.log_ratio = self._ratios(which, np.maximum(varies, self._left_by(which)))
         self._top = np.maximum(self._top, self.log_ratio - before)
         return self._judge(varies, self.starts <= (day if noticed is None else noticed))
 
@@ -297,12 +298,15 @@ class Watch:
             before = _log_within(most, room - least, spread**2 + self._unsure[:, at])
             parts.append(ratio + np.where(bounded, after - before, 0.0))
         begun = logsumexp(np.array(parts), axis=0) - np.log(len(parts))
-        lost = np.concatenate([np.zeros(k), [size for _, size in self.ends]])[which]
+        lost = self._lost[which]
         return np.asarray(np.where(which < k, begun, -lost * score - 0.5 * lost**2 * information))
 
     def _left_by(self, which: IntArray) -> FloatArray:
-        """Mean square of what changes leave of the innovations since each start, shape (n_start, n) [-]."""
-        explained = self._score[:, which] ** 2 / np.maximum(self._information[:, which], 1e-300)
+        """Mean square of what changes and ends leave of the innovations since each start, shape (n_start, n) [-]."""
+        at, lost = self._place(which), self._lost[which]
+        score, information = self._score[:, at], self._information[:, at]
+        begun = score**2 / np.maximum(information, 1e-300)
+        explained = np.where(which < self.what.which.size, begun, -2.0 * lost * score - lost**2 * information)
         return np.asarray((self._square - explained) / np.maximum(self._seen, 1.0))
 
     def _place(self, which: IntArray) -> IntArray:
@@ -325,7 +329,7 @@ class Watch:
         likeliest = int(np.argmax(logsumexp(told, axis=0)))
         which, k = np.arange(weight.size), self.what.which.size
         since = int(np.flatnonzero(begun)[np.argmax(told[:, likeliest])])
-        left = self._left_by(self._place(np.array([likeliest])))[since, 0]
+        left = self._left_by(np.array([likeliest]))[since, 0]
         pair = np.maximum(np.maximum(varies, varies[likeliest]), left)
         beside = logsumexp(self._ratios(np.full_like(which, likeliest), pair)[begun], axis=0)
         shows = np.log(-np.expm1(-np.maximum(1e-12, self.log_ratio[begun].max(axis=0))))
@@ -341,7 +345,7 @@ def _log_within(most: FloatArray, mean: FloatArray, variance: FloatArray) -> Flo
 
     In the tail that is the smaller one, where the difference of two probabilities is not lost.
     """
-    deviation, above = np.sqrt(variance), mean > 0.5 * most
+    deviation, above = np.sqrt(np.maximum(variance, 1e-300)), mean > 0.5 * most
     near = log_ndtr(np.where(above, most - mean, mean) / deviation)
     far = log_ndtr(np.where(above, -mean, mean - most) / deviation)
     return np.asarray(near + np.log1p(-np.exp(np.minimum(far - near, -1e-300))))

@@ -21,8 +21,8 @@ _HEIGHT, _TEMPERATURE = 1.0, 285.0
 #: a station on a field of 10 m measures; and discharge of an opening [-].
 _BY_WIND, _DISCHARGE = 0.3 * 0.5, 0.65
 
-#: Flow per area that is usual in winter, between that on one side and that across [m/s].
-_USUAL = 0.3
+#: Wind [m/s] and difference of the temperatures [K] that are usual in winter.
+_USUAL = np.array(3.0), np.array(15.0)
 
 
 def on_one_side(wind: FloatArray, difference: FloatArray) -> FloatArray:
@@ -68,7 +68,7 @@ def across(wind: FloatArray, difference: FloatArray) -> FloatArray:
 
 
 def steady(wind: FloatArray, difference: FloatArray) -> FloatArray:
-    """Flow per area that neither wind nor warmth changes: a sheltered window, or a fan [m/s].
+    """Flow per area that neither wind nor warmth changes: a sheltered window, or a fan that is as strong as one [m/s].
 
     Parameters
     ----------
@@ -79,7 +79,26 @@ def steady(wind: FloatArray, difference: FloatArray) -> FloatArray:
 
     Examples
     --------
-    >>> float(steady(np.array(4.0), np.array(10.0)))
-    0.3
+    >>> round(float(steady(np.array(4.0), np.array(10.0))), 3)
+    0.134
     """
-    return np.full(np.broadcast(wind, difference).shape, _USUAL)
+    return np.full(np.broadcast(wind, difference).shape, float(on_one_side(*_USUAL)))
+
+
+def counted_on_one_side(law: WindowLaw) -> WindowLaw:
+    """Count areas in those that pass as much air on one side of a room in usual wind and cold.
+
+    So that areas by one law are comparable to those by another.
+
+    Parameters
+    ----------
+    law : callable
+        One of the laws.
+
+    Examples
+    --------
+    >>> round(float(counted_on_one_side(across)(*_USUAL) / on_one_side(*_USUAL)), 12)
+    1.0
+    """
+    share = float(on_one_side(*_USUAL) / law(*_USUAL))
+    return lambda wind, difference: np.asarray(share * law(wind, difference))
