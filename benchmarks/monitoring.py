@@ -22,13 +22,15 @@ doors were not stable, 144 to 183 by the values before these; 184 to 203, 220 to
 clocks were told by weather that is moved and capacity by the seasons. Of those 226 to 229, 231, 236, 239, 241 and 243
 to 258 were looked at for that; 260 to 299 confirm it. Of the houses 0 to 7 were looked at, to see that they can be
 watched, and 20 to 35, after which windows are as wide as rooms let them be and a heater that is off, or on and gives
-less than it says, counts as a meter too; nothing of the method was chosen on them. 60 to 94 are the
-table, after which heat that begins is sought alike everywhere.
+less than it says, counts as a meter too. 60 to 94 have been tabulated by the method as it came from the offices, 100 to
+139 once heat that begins was sought alike everywhere. How long evidence has to last was chosen on 0 to 35 and seen on
+100 to 139 and the offices 220 to 239; laws of windows and limits of strengths on the windows among 65 to 121. The
+houses 140 to 160 and the offices 311 to 323 confirm that.
 
 Run from the repository's root; an interrupted run goes on where it was::
 
     python benchmarks/monitoring.py --seeds 260-299 --out results/monitoring --publish
-    python benchmarks/monitoring.py --world house --seeds 60-94 --out results/monitoring_houses --publish
+    python benchmarks/monitoring.py --world house --seeds 140-160 --out results/monitoring_houses --publish
 """
 
 from __future__ import annotations
