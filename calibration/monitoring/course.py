@@ -24,7 +24,7 @@ THRESHOLD = 12.0
 
 #: Days for which the evidence has to stay over the threshold before it is an alarm [d], and multiple of the threshold
 #: from which it is one at once [-]. Fronts and spells of days unlike others pass within days, a change does not.
-_LASTS, _AT_ONCE = 3, 2.0
+LASTS, AT_ONCE = 3, 2.0
 
 #: Days after an alarm by which a change is named [d]: evidence that is enough for an alarm is not always for a name.
 NAMING_DAYS = 7
@@ -235,7 +235,7 @@ class _Walk:
         if self.pending is None:
             self.evidence[day] = alarm.log_evidence
             self.lasts = self.lasts + 1 if alarm.log_evidence > self.threshold else 0
-            if self.lasts > _LASTS or alarm.log_evidence > _AT_ONCE * self.threshold:
+            if self.lasts > LASTS or alarm.log_evidence > AT_ONCE * self.threshold:
                 self.pending = day
         self.alarm = alarm
         self._settle_if_noticed(day, alarm, self.watch)

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from calibration.monitoring.course import UNKNOWN_CAUSE, Event
+from calibration.monitoring.course import LASTS, UNKNOWN_CAUSE, Event
 from calibration.monitoring.days import USUAL
 from calibration.monitoring.monitor import Monitoring
 from mpc.reports.diagnosis_words import called, in_zones
@@ -37,7 +37,7 @@ def write_monitoring(found: Monitoring, out: str | Path, *, force: bool = False)
         "case": found.case, "verdict": monitoring_verdict(found), "means": monitoring_means(found),
         "events": event_rows(found), "horizon": found.settings.horizon,
         "figures": time_line(found), "span": (found.days.dates[0], found.days.dates[-1]),
-        "reference": found.settings.reference_days, "threshold": found.course.threshold,
+        "reference": found.settings.reference_days, "threshold": found.course.threshold, "lasts": LASTS,
         "withdrawn": [f"{found.date(day):%Y-%m-%d}" for day in found.course.withdrawn],
         "untestable": [
             *(f"{zone}: {reason}" for zone, reason in found.silent_zones.items()),

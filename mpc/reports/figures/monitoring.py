@@ -5,6 +5,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from calibration.monitoring.course import AT_ONCE
 from calibration.monitoring.monitor import Monitoring
 from mpc.reports.diagnosis_words import called
 from mpc.reports.figures import style
@@ -29,13 +30,15 @@ def time_line(found: Monitoring) -> list[Picture]:
     for axes in bars:
         _changes(axes, found, x)
     evidence.plot(x, np.maximum(daily["log_evidence"].to_numpy(), -5.0), color=MEASURED, linewidth=0.9)
-    evidence.plot(x[[0, -1]], np.full(2, found.course.threshold), color=WARNING, linestyle="--", linewidth=0.9)
+    for level, line in ((found.course.threshold, "--"), (AT_ONCE * found.course.threshold, ":")):
+        evidence.plot(x[[0, -1]], np.full(2, level), color=WARNING, linestyle=line, linewidth=0.9)
     evidence.set_ylim(-6.0, 3.0 * found.course.threshold)
     first, beside = (bars[0], -0.95) if bars else (evidence, 2.6 * found.course.threshold)
     sound = x[[0, min(found.settings.reference_days, len(x) - 1)]]
     first.fill_between(sound, *first.get_ylim(), color=MUTED, alpha=0.2, linewidth=0)
     first.text(x[0], beside, " reference days", va="center", fontsize=8)
-    evidence.set(title="Evidence that something has changed, dashed: alarm", ylabel="log evidence [-]")
+    evidence.set_title("Evidence that something has changed; an alarm where it lasts (dashed) or at once (dotted)")
+    evidence.set_ylabel("log evidence [-]")
     weekly = pd.concat([weekly, weekly.iloc[-1:]])  # the last week goes on until the telemetry ends
     weeks = np.append(style.day_numbers(weekly.index[:-1]), x[-1])  # type: ignore[arg-type]
     error.step(weeks, weekly["mae"], where="post", color=MUTED, label="model of the reference days")

@@ -179,7 +179,7 @@ def test_starts_stay_while_an_alarm_waits_for_its_name() -> None:
 @pytest.mark.parametrize("lasts", [0, 3])
 def test_delay_is_near_lordens_bound(lasts: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """No detector of mean run length A is sooner than log A / I on average, I the divergence a day (Lorden 1971)."""
-    monkeypatch.setattr("calibration.monitoring.course._LASTS", lasts)
+    monkeypatch.setattr("calibration.monitoring.course.LASTS", lasts)
     threshold, shift = 14.0, 1.2
     delays = []
     for seed in range(4):
@@ -240,7 +240,7 @@ def test_a_few_days_unlike_others_are_no_alarm_or_withdrawn(over: int) -> None:
 
 def test_evidence_of_twice_the_threshold_does_not_wait(monkeypatch: pytest.MonkeyPatch) -> None:
     """It is 23.6 on day 68 and 27.2 on day 69."""
-    monkeypatch.setattr("calibration.monitoring.course._LASTS", 1000)
+    monkeypatch.setattr("calibration.monitoring.course.LASTS", 1000)
     (event,) = follow(made(3, 120, 1.0, start=60), REFERENCE).events
     assert (event.since, event.alarm) == (60, 69)
 
