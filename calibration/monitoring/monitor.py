@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -228,7 +229,9 @@ def monitor(
     given = ModelSettings(**read_settings(parameters)) if parameters is not None else ModelSettings()
     made = replace(given, effects={}, dx=chosen.dx if chosen.dx is not None else given.dx)
     models = ModelComparison(case, made, [reference], horizon=chosen.horizon)
-    drivers = _of_seasons(case, fit_normalisation(case, [(reference.start, reference.end)]), chosen.horizon)
+    usual = fit_normalisation(case, [(reference.start, reference.end)])
+    laws = (on_one_side, counted_on_one_side(across), counted_on_one_side(steady))
+    drivers, *draughts = _of_seasons(case, usual, chosen.horizon, laws)
     models.drivers = drivers
     untestable = models.untestable()
     said = reasons_of(chosen.known or (), chosen.ruled_out, untestable)
@@ -248,9 +251,8 @@ def monitor(
     candidates = [e for e in CATALOGUE if e not in untestable and not (set(CATALOGUE[e].requires) - set(effects))]
     hour = max(1, round(3600.0 / case.step)) * case.step / 3600.0  # whole steps
     moved = {h: _moved(models, h) for h in (-hour, hour)} if "clock_shift" in {*effects, *candidates} else None
-    laws = (across, steady) if "window_opening" in {*effects, *candidates} else ()
-    draughts = [_of_seasons(case, drivers.normalisation, chosen.horizon, counted_on_one_side(law)) for law in laws]
-    days = days_of_case(models, effects, values, [*candidates, *NO_CAUSE], moved, draughts, progress)
+    by_law = draughts if "window_opening" in {*effects, *candidates} else ()
+    days = days_of_case(models, effects, values, [*candidates, *NO_CAUSE], moved, by_law, progress)
     course = follow(days, chosen.reference_days, chosen.ruled_out, progress)
     watched = {e: r for e, r in untestable.items() if e in MAY_CHANGE}
     source = Path(parameters).name if parameters is not None else "fitted to the reference days"
@@ -261,26 +263,29 @@ def monitor(
 
 
 def _of_seasons(
-    case: Case, normalisation: Normalisation, horizon: str, law: WindowLaw = on_one_side
-) -> InputProvider:
+    case: Case, normalisation: Normalisation, horizon: str, laws: Sequence[WindowLaw] = (on_one_side,)
+) -> list[InputProvider]:
     """Read the inputs, and let a window of every zone stand open in them, so that its strength is the area that does.
 
     Air leaves at what was measured where a run begins, and goes on as is usual for the season: as the mean of the week
     before at the same time of the day does. Later temperatures of a run would hand the model the errors that it is to
-    be judged by, and the season alone does not know that a room with an open window has become cold.
+    be judged by, and the season alone does not know that a room with an open window has become cold. One for each law
+    by which air passes windows.
     """
-    drivers, seasonal = telemetry_inputs(case, normalisation), telemetry_inputs(case, normalisation)
-    drivers.openings = np.ones_like(drivers.openings)
-    if drivers.gives("through_windows"):
+    read = telemetry_inputs(case, normalisation)
+    read.openings = np.ones_like(read.openings)
+    read.largest_heat = np.maximum(read.largest_heat, _largest_heat(case))
+    by_law, seasonal = [copy(read) for _ in laws], copy(read)
+    if read.gives("through_windows"):
         zone, stamps = case.zone_temperatures(), case.stamps
         at_this_time = zone.groupby([stamps.hour, stamps.minute, stamps.second])
         week = at_this_time.transform(lambda of: of.shift().rolling(_SEASON, min_periods=1).mean())
-        usual = np.where(week.notna(), week, seasonal.usual)
+        usual = np.where(week.notna(), week, read.usual)
         unlike = np.nan_to_num(zone.to_numpy() - usual)
         seasonal.usual = usual + unlike[_begin_of_run(case, horizon)]
-        drivers.through_windows = seasonal.windows_by(law)
-    drivers.largest_heat = np.maximum(drivers.largest_heat, _largest_heat(case))
-    return drivers
+        for drivers, law in zip(by_law, laws, strict=True):
+            drivers.through_windows = seasonal.windows_by(law)
+    return by_law
 
 
 def _begin_of_run(case: Case, horizon: str) -> IntArray:
@@ -304,7 +309,7 @@ def _largest_heat(case: Case) -> FloatArray:
 def _moved(models: ModelComparison, hours: float) -> ModelComparison:
     """Move the weather of a case."""
     moved = replace(models, case=models.case.with_weather_moved(hours))
-    moved.drivers = _of_seasons(moved.case, models.drivers.normalisation, models.horizon)
+    (moved.drivers,) = _of_seasons(moved.case, models.drivers.normalisation, models.horizon)
     return moved
 
 

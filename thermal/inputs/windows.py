@@ -18,7 +18,7 @@ _GRAVITY = 9.80665
 _HEIGHT, _TEMPERATURE = 1.0, 285.0
 
 #: Air that a wind at an angle drives through an opening over the wind's speed there, which among houses is half of what
-#: a station on a field of 10 m measures; and discharge of an opening [-].
+#: a station at 10 m on a field measures; and discharge of an opening [-].
 _BY_WIND, _DISCHARGE = 0.3 * 0.5, 0.65
 
 #: Wind [m/s] and difference of the temperatures [K] that are usual in winter.

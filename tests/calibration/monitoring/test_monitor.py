@@ -121,7 +121,7 @@ def test_open_windows_lose_air_of_the_season(quiet: Case) -> None:
     frame.loc[late, columns] += 5.0
     warmer = Case(quiet.building, replace(quiet.telemetry, frame=frame))
     reference = fit_normalisation(quiet, [(quiet.stamps[0], quiet.stamps[0] + pd.Timedelta(days=REFERENCE))])
-    cold = [_of_seasons(case, reference, "6h").through_windows for case in (quiet, warmer)]
+    cold = [_of_seasons(case, reference, "6h")[0].through_windows for case in (quiet, warmer)]
     day = np.asarray((quiet.stamps - quiet.stamps[0].normalize()).days)
     assert cold[1][day < CHANGED] == pytest.approx(cold[0][day < CHANGED])
     same = (day == CHANGED) & (np.asarray(quiet.stamps.hour) == 0)
@@ -137,7 +137,7 @@ def test_terminals_show_what_they_can_give_as_seasons_come(quiet: Case) -> None:
     frame.loc[late, f"VAV_{zone}/supply_air_flowrate_sensor"] *= 2.0
     stronger = Case(quiet.building, replace(quiet.telemetry, frame=frame))
     reference = fit_normalisation(quiet, [(quiet.stamps[0], quiet.stamps[0] + pd.Timedelta(days=REFERENCE))])
-    before, after = (_of_seasons(case, reference, "6h").largest_heat[:, 0] for case in (quiet, stronger))
+    before, after = (_of_seasons(case, reference, "6h")[0].largest_heat[:, 0] for case in (quiet, stronger))
     day = np.asarray((quiet.stamps - quiet.stamps[0].normalize()).days)
     assert (before >= reference.heat[zone]).all() and (np.diff(before) >= 0.0).all()
     assert after[day <= CHANGED] == pytest.approx(before[day <= CHANGED])
@@ -147,7 +147,7 @@ def test_terminals_show_what_they_can_give_as_seasons_come(quiet: Case) -> None:
 def test_a_clock_counts_in_hours_whatever_it_was_moved_by() -> None:
     case = load_bundled_case()
     models = ModelComparison(case, ModelSettings(dx=2.0), [Interval(case.stamps[0], case.stamps[len(case.stamps) // 2])])
-    models.drivers = _of_seasons(case, fit_normalisation(case), "6h")
+    (models.drivers,) = _of_seasons(case, fit_normalisation(case), "6h")
     by_hours = [_errors_and_clock(models, {}, {}, {h: _moved(models, h) for h in (-hours, hours)})[1]
                 for hours in (0.5, 1.5)]  # fmt: skip
     known = np.isfinite(by_hours[0]) & np.isfinite(by_hours[1])
@@ -159,7 +159,7 @@ def test_a_wrong_clock_shows_as_its_column_says() -> None:
     """Weather that is said an hour late moves the sun too, which the tangent of the outdoor temperature lacks."""
     case = load_bundled_case()
     models = ModelComparison(case, ModelSettings(dx=2.0), [Interval(case.stamps[0], case.stamps[len(case.stamps) // 2])])
-    models.drivers = _of_seasons(case, fit_normalisation(case), "6h")
+    (models.drivers,) = _of_seasons(case, fit_normalisation(case), "6h")
     effects, values = {"solar_gain": ()}, {"solar_heat_gain_coefficient": 0.5}
     moved = {hours: _moved(models, hours) for hours in (-1.0, 1.0)}
     late, moves = (_errors_and_clock(m, effects, values, moved) for m in (moved[1.0], models))
@@ -188,7 +188,7 @@ def test_a_run_knows_where_it_begins_and_no_more(quiet: Case, horizon: str) -> N
         frame = quiet.telemetry.frame.copy()
         frame.loc[frame.index[0].normalize() + pd.Timedelta(days=CHANGED, hours=12 + hour), name] += 5.0
         cases = quiet, Case(quiet.building, replace(quiet.telemetry, frame=frame))
-        before, after = (_of_seasons(case, reference, horizon).through_windows[:, 0] for case in cases)
+        before, after = (_of_seasons(case, reference, horizon)[0].through_windows[:, 0] for case in cases)
         since = (quiet.stamps - quiet.stamps[0].normalize()) / pd.Timedelta(hours=1) - 24.0 * CHANGED
         changed.append(np.asarray(since)[(np.abs(after - before) > 1e-9) & (np.asarray(since) <= 24.0)])
     assert changed[0] == pytest.approx(np.arange(13.0, 13.0 + hours))
@@ -199,7 +199,7 @@ def test_a_window_is_sought_by_each_law(quiet: Case) -> None:
     """Each derivative is that of a model whose windows let as much air through."""
     models = ModelComparison(quiet, ModelSettings(dx=2.0), [Interval(quiet.stamps[0], quiet.stamps[200])])
     normalisation = fit_normalisation(quiet)
-    of_laws, own = [_of_seasons(quiet, normalisation, "6h", law) for law in (on_one_side, across, steady)], []
+    of_laws, own = _of_seasons(quiet, normalisation, "6h", (on_one_side, across, steady)), []
     for drivers, further in ((of_laws[0], of_laws[1:]), *((each, ()) for each in of_laws)):
         models.drivers = drivers
         days = days_of_case(models, {}, {}, ["window_opening"], None, further)
@@ -218,7 +218,7 @@ def test_heat_that_begins_everywhere_is_told_where_a_room_has_no_device(quiet: C
     frame = frame.drop(columns=frame.filter(regex=f"^VAV_{zone}/").columns)
     case = Case(bare, replace(quiet.telemetry, frame=frame))
     models = ModelComparison(case, ModelSettings(dx=2.0), [Interval(case.stamps[0], case.stamps[len(case.stamps) // 2])])
-    models.drivers = _of_seasons(case, fit_normalisation(case), "6h")
+    (models.drivers,) = _of_seasons(case, fit_normalisation(case), "6h")
     effects, share = {"internal_gains": ()}, "internal_gain_unserved_share"
     built = models.build(effects)
     start = {p.name: p.start for p in built.network.parameters}
