@@ -7,7 +7,7 @@ import io
 import time
 import warnings
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from mpc.control.identified.action import PlannedAction
 from mpc.control.identified.controller import IdentifiedController
 from mpc.control.identified.problem import SCALE
 from mpc.control.solvers.solution import Status
-from mpc.control.solvers.stages import StageData, StageProblem, StageSolution
+from mpc.control.solvers.stages import StageData, StageMethod, StageProblem, StageSolution
 from mpc.loop.plant import Measurements
 from mpc.scenario.forecast import Forecast
 
@@ -120,7 +120,8 @@ class DoMpcController:
     def __init__(self, ours: IdentifiedController, n_steps: int) -> None:
         hours = ours.model.step / 3600.0
         price = SCALE * ours.settings.comfort_price * hours
-        ours._solver = DoMpcStages(ours._problem.stage, n_steps, price)  # type: ignore[assignment]
+        solver = DoMpcStages(ours._problem.stage, n_steps, price)
+        ours._solvers = {(n_steps, method): solver for method in get_args(StageMethod)}  # type: ignore[misc]
         self.ours = ours
 
     def step(self, measurements: Measurements, forecast: Forecast | None) -> PlannedAction:

@@ -25,11 +25,11 @@ watched, and 20 to 35, after which windows are as wide as rooms let them be and 
 less than it says, counts as a meter too. 60 to 94 have been tabulated by the method as it came from the offices, 100 to
 139 once heat that begins was sought alike everywhere. How long evidence has to last was chosen on 0 to 35 and seen on
 100 to 139 and the offices 220 to 239; laws of windows and limits of strengths on the windows among 65 to 121. The
-houses 140 to 160 and the offices 311 to 323 confirm that.
+houses 140 to 160 and the offices 311 to 323 and 325 to 364 confirm that.
 
 Run from the repository's root; an interrupted run goes on where it was::
 
-    python benchmarks/monitoring.py --seeds 260-299 --out results/monitoring --publish
+    python benchmarks/monitoring.py --seeds 325-364 --out results/monitoring --publish
     python benchmarks/monitoring.py --world house --seeds 140-160 --out results/monitoring_houses --publish
 """
 

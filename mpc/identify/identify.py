@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from mpc.identify.machines import Machine
 from mpc.identify.maps import Loads, led_heat, map_machines
 from mpc.identify.model import PlantModel
 from mpc.identify.shared import out_of_reach, shared_of
+from mpc.identify.source import find_source
 from mpc.identify.telemetry import CARRIERS, SET, PlantTelemetry
 from thermal._types import FloatArray
 from thermal.case.points import ZONE_TEMPERATURE
@@ -94,11 +95,15 @@ def identify(telemetry: PlantTelemetry, machines: Sequence[Machine], progress: P
     own = [telemetry.column(m.power) if m.power and m.heat else None for m in machines]
     above = _above(telemetry, machines)
     maps, base = map_machines(machines, loads, signals, bought, above, own)
+    source, left = find_source(loads, bought, maps, round(86_400.0 / telemetry.step))
+    if source is not None:
+        rest = [{kind: curve for kind, curve in m.powers.items() if kind not in source.powers} for m in maps]
+        maps = tuple(replace(m, powers=powers) for m, powers in zip(maps, rest, strict=True))
     alone, law = [found.limits for found in maps], np.array([found.above[1] for found in maps])
     wanted = out_of_reach(above, law)
     shared = shared_of(led_heat(maps), telemetry.step, loads.outdoor, loads.level, wanted, alone)
     notes = _notes(telemetry, machines, suns)
-    model = PlantModel(telemetry.site.name, telemetry.step, box, maps, base, shared)
+    model = PlantModel(telemetry.site.name, telemetry.step, box, maps, base | left, shared, source)
     return Identified(model, telemetry, data, loads, tuple(errors), split, notes)
 
 

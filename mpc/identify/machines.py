@@ -25,7 +25,7 @@ _HELPERS = re.compile(r"(^|_)(fan|pump|valve|damper)(_|$)")
 _POWERS = ("electrical_power_sensor", "gas_power_sensor")
 
 #: Share of the largest values that a full load is read from [-], robust against single steps.
-_FULL = 0.98
+FULL = 0.98
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Machine:
         if self.heat or self.power:
             return telemetry.column(self.heat or self.power)
         bought = telemetry.bought
-        return np.asarray(bought - np.quantile(bought, 1.0 - _FULL))
+        return np.asarray(bought - np.quantile(bought, 1.0 - FULL))
 
     def level(self, telemetry: PlantTelemetry) -> FloatArray:
         """Load as a share of full load, shape (n_time,) [-]; NaN while nothing says it.
@@ -105,7 +105,7 @@ class Machine:
         PlantError
             When it never ran.
         """
-        full = float(np.quantile(self.signal(telemetry), _FULL))
+        full = float(np.quantile(self.signal(telemetry), FULL))
         PlantError.unless(full > 1.0, f"telemetry: {self.name}", "heat or power at some time", f"{full:g} W")
         return full
 

@@ -28,7 +28,10 @@ _IDLE = 1e-6
 _SAME = 0.05
 
 #: Part loads at which efficiency is compared with that of full load [-], and what full load may be worse [-].
-_PARTS, _WORSE = (0.3, 0.5, 0.7), 0.02
+_PARTS, WORSE = (0.3, 0.5, 0.7), 0.02
+
+#: Parts of the days of which each is left out once.
+_FOLDS = 5
 
 #: Steps over which errors of a regression may hang together (Newey and West 1987, doi:10.2307/1913610): an hour.
 _LAGS = 4
@@ -208,8 +211,50 @@ def led_heat(maps: Sequence[MachineMap]) -> FloatArray:
     return np.array([float(m.at(m.heat, 1.0, OUTDOOR, EMITTER)) if m.operation == "setpoint" else 0.0 for m in maps])
 
 
+def _design(
+    loads: Loads, known: BoolArray, machines: Sequence[int], base: bool, standing: bool
+) -> tuple[FloatArray, list[tuple[int, str]]]:
+    """Columns of a regression, by machine and feature; a constant first, where something may be left."""
+    columns, owners = ([np.ones(int(known.sum()))], [(-1, "constant")]) if base else ([], [])
+    for m in machines:
+        for name, feature in loads.features(m).items():
+            column = feature[known[loads.known]]
+            if name != "standing" or (standing and not (base and column.all())):
+                columns.append(column)
+                owners.append((m, name))
+    return np.column_stack(columns), owners
+
+
+def left_out_error(
+    loads: Loads, values: FloatArray, machines: Sequence[int], per_day: int, *, standing: bool = True
+) -> float:
+    """Mean squared error of a regression on days that it has not seen [W2]: each fifth of the days is left out once.
+
+    Parameters
+    ----------
+    loads : Loads
+        Of all machines.
+    values : ndarray, shape (n_time,)
+        Measured [W].
+    machines : sequence of int
+        Which machines have a part in it.
+    per_day : int
+        Steps of a day.
+    standing : bool
+        Whether a machine may draw power at any load above 0.
+    """
+    known = loads.known & np.isfinite(values)
+    design, _ = _design(loads, known, machines, True, standing)
+    fold, seen = (np.flatnonzero(known) // per_day) % _FOLDS, values[known]
+    errors = np.empty(len(seen))
+    for k in range(_FOLDS):
+        out = fold == k
+        errors[out] = design[out] @ np.linalg.lstsq(design[~out], seen[~out])[0] - seen[out]
+    return float(np.mean(errors**2))
+
+
 def regress(
-    loads: Loads, values: FloatArray, machines: Sequence[int], *, base: bool = True
+    loads: Loads, values: FloatArray, machines: Sequence[int], *, base: bool = True, standing: bool = True
 ) -> tuple[list[Curve], float]:
     """Regress what is measured on the features of machines, a constant beside them.
 
@@ -224,6 +269,8 @@ def regress(
     base : bool
         Whether something may be left when all machines are off; nothing tells that from the standing part of a machine
         that never stops, which is then counted to it.
+    standing : bool
+        Whether a machine may draw power at any load above 0.
 
     Returns
     -------
@@ -240,18 +287,11 @@ def regress(
     from statsmodels.regression.linear_model import OLS
 
     rows = loads.known & np.isfinite(values)
-    columns, owners = ([np.ones(int(rows.sum()))], [(-1, "constant")]) if base else ([], [])
-    for m in machines:
-        for name, feature in loads.features(m).items():
-            column = feature[rows[loads.known]]
-            if not (base and name == "standing" and column.all()):
-                columns.append(column)
-                owners.append((m, name))
+    design, owners = _design(loads, rows, machines, base, standing)
     PlantError.unless(
-        rows.sum() > 4 * len(columns), "component maps", f"{4 * len(columns)} steps with known commands", rows.sum(),
+        rows.sum() > 4 * len(owners), "component maps", f"{4 * len(owners)} steps with known commands", rows.sum(),
         "give more days, or telemetry whose commands are recorded",
     )  # fmt: skip
-    design = np.column_stack(columns)
     found = OLS(values[rows], design).fit(cov_type="HAC", cov_kwds={"maxlags": _LAGS})
     with np.errstate(invalid="ignore"):  # of a feature that says next to nothing the variance may round below zero
         deviations = np.asarray(found.bse)
@@ -328,7 +368,7 @@ def _operation(found: MachineMap) -> Operation:
     if found.machine.actuator.kind != "continuous":
         return "duty"
     best = max(found.efficiency(u) for u in _PARTS)
-    return "duty" if found.efficiency(1.0) >= (1.0 - _WORSE) * best and found.standing > 0.0 else "modulated"
+    return "duty" if found.efficiency(1.0) >= (1.0 - WORSE) * best and found.standing > 0.0 else "modulated"
 
 
 def _local(level: FloatArray, above: FloatArray) -> tuple[float, float]:

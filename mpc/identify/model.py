@@ -16,12 +16,17 @@ from mpc.errors import ControlError, MpcError
 from mpc.identify.curves import Curve
 from mpc.identify.machines import Machine
 from mpc.identify.maps import MachineMap, OwnPower, led_heat
+from mpc.identify.shared import shares_of
+from mpc.identify.source import Source
 from mpc.identify.telemetry import CARRIERS
 from mpc.loop.actuators import Actuator
 from thermal._types import FloatArray
 
 #: File of a model in its folder, and the version of its contents.
-FILE, FORMAT = "model.json", 4
+FILE, FORMAT = "model.json", 5
+
+#: A load that is none [-].
+_NOTHING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +48,8 @@ class PlantModel:
     shared : tuple of tuple of float
         Steps at which one source held the machines that are led by setpoints back together: outdoor air [K], and their
         load as a share of the sum of their full loads [-], see `SharedLimit`.
+    source : Source or None
+        What they buy together; None where each has a map of its own.
     """
 
     name: str
@@ -51,6 +58,7 @@ class PlantModel:
     maps: tuple[MachineMap, ...]
     base: Mapping[str, float] = field(default_factory=dict)
     shared: tuple[tuple[float, float], ...] = ()
+    source: Source | None = None
 
     @property
     def led_heat(self) -> FloatArray:
@@ -78,6 +86,8 @@ class PlantModel:
     def bought(self, states: FloatArray, levels: FloatArray, outdoor: FloatArray | float) -> FloatArray:
         """Power that each machine buys, shape (..., n_machine, n_carrier) [W]; `base` is not among it.
 
+        What a source buys is shared out by load.
+
         Parameters
         ----------
         states, levels, outdoor : ndarray
@@ -88,6 +98,11 @@ class PlantModel:
         for k, found in enumerate(self.maps):
             for carrier, curve in found.powers.items():
                 powers[..., k, CARRIERS.index(carrier)] = found.at(curve, levels[..., k], outdoor, emitter[..., k])
+        if self.source is not None:
+            loads = levels[..., : len(self.maps)] * shares_of(self.led_heat)
+            total = loads.sum(axis=-1)
+            by_load = self.source.at(total, outdoor) / np.maximum(total, _NOTHING)[..., None]
+            powers += loads[..., None] * by_load[..., None, :]
         return powers
 
     @property
@@ -111,6 +126,7 @@ class PlantModel:
         return {
             "format": FORMAT, "name": self.name, "step": self.step, "grey_box": self.box.to_dict(), "machines": maps,
             "base": dict(self.base), "shared": [list(pair) for pair in self.shared],
+            "source": None if self.source is None else asdict(self.source),
         }  # fmt: skip
 
     @classmethod
@@ -133,7 +149,8 @@ class PlantModel:
             maps = tuple(_map_of(entry) for entry in content["machines"])
             box = GreyBox.from_dict(content["grey_box"])
             shared = tuple((float(outdoor), float(load)) for outdoor, load in content["shared"])
-            return cls(str(content["name"]), float(content["step"]), box, maps, dict(content["base"]), shared)
+            base, source = dict(content["base"]), _source_of(content["source"])
+            return cls(str(content["name"]), float(content["step"]), box, maps, base, shared, source)
         except (KeyError, TypeError, ValueError, MpcError, CalibrationError) as error:
             raise ControlError(where, expected, f"{type(error).__name__}: {error}") from error
 
@@ -155,6 +172,12 @@ def _own_of(entry: Mapping[str, Any] | None) -> OwnPower | None:
         return None
     readings = tuple((float(a), float(b), float(c), float(d)) for a, b, c, d in entry["readings"])
     return OwnPower(Curve(**entry["curve"]), float(entry["idle"]), readings)
+
+
+def _source_of(entry: Mapping[str, Any] | None) -> Source | None:
+    if entry is None:
+        return None
+    return Source({kind: Curve(**curve) for kind, curve in entry["powers"].items()}, float(entry["full"]))
 
 
 def read_model(folder: Path) -> PlantModel:

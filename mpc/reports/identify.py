@@ -1,14 +1,17 @@
 """What an identification leaves behind: the model, its telemetry, how well it predicts, and a page."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from calibration.results import Content
-from mpc.identify.curves import EMITTER, OUTDOOR, interval_of
+from mpc.identify.curves import EMITTER, OUTDOOR, Curve, interval_of
 from mpc.identify.identify import Identified
+from mpc.identify.maps import MachineMap
 from mpc.identify.model import FILE, PlantModel
+from mpc.identify.source import Source
 from mpc.kpi.kpis import Kpis, measure_kpis
 from mpc.reports.display import write_results
 from mpc.reports.figures.identify import course_pictures, error_pictures, map_pictures
@@ -108,10 +111,14 @@ def identify_summary(found: Identified, made: Experiment | None) -> dict[str, An
         "machines": {
             m.machine.name: {
                 "operation": m.operation, "standing_power": m.standing,
-                "efficiency": {"full": m.efficiency(1.0), "half": m.efficiency(0.5)},
-                "terms": [dict(zip(("what", "term", "value", "interval"), row[1:], strict=True)) for row in _terms(m)],
+                "efficiency": {"full": m.efficiency(1.0), "half": m.efficiency(0.5)} if m.powers else None,
+                "terms": [_told(row) for row in _terms(m)],
             }
             for m in found.model.maps
+        },
+        "source": None if found.model.source is None else {
+            "full_load": found.model.source.full, "half_over_full": _dearer(found.model.source),
+            "terms": [_told(row) for row in _source_terms(found.model.source)],
         },
         "time_constants_hours": (box.time_constants / 3600.0).tolist(), "heat_loss": box.heat_loss.tolist(),
         "unmeasured_heat": box.disturbance.to_dict(), "notes": list(found.notes),
@@ -150,6 +157,9 @@ def identify_verdict(found: Identified, made: Experiment | None) -> str:
     standing = [(m.machine.name, m.standing) for m in found.model.maps if m.standing > _SEEN]
     if standing:
         text += f"{listed([f'{name} draws {significant(w, 2)} W' for name, w in standing])} at any speed. "
+    if found.model.source is not None:
+        text += f"One source feeds them all: at half load its heat takes {percent(_dearer(found.model.source) - 1.0)} "
+        text += "more than at full load. "
     if made is not None:
         k = experiment_kpis(made)
         text += (
@@ -201,22 +211,45 @@ def map_rows(model: PlantModel) -> list[list[str]]:
     model : PlantModel
         Identified.
     """
+    rows = [row for m in model.maps for row in _terms(m)]
+    rows += _source_terms(model.source) if model.source is not None else []
     return [
         [name, what, term, f"{spell(value, ',.0f')} W", f"{spell(low, ',.0f')} to {spell(high, ',.0f')} W"]
-        for m in model.maps
-        for name, what, term, value, (low, high) in _terms(m)
+        for name, what, term, value, (low, high) in rows
         if max(abs(low), abs(high)) >= _SEEN
     ]
 
 
-def _terms(m: Any) -> list[tuple[str, str, str, float, tuple[float, float]]]:
-    """Machine, what, term, value and interval of each coefficient [W]."""
-    curves = {"heat" if m.machine.heat else "heat, in what is bought": m.heat, **m.powers}
+#: Machine, what, term, value and interval of a coefficient [W].
+_Term = tuple[str, str, str, float, tuple[float, float]]
+
+
+def _terms(m: MachineMap) -> list[_Term]:
+    """List the coefficients of a machine."""
+    return _terms_of(m.machine.name, {"heat" if m.machine.heat else "heat, in what is bought": m.heat, **m.powers})
+
+
+def _source_terms(source: Source) -> list[_Term]:
+    """List the coefficients of a source."""
+    return _terms_of("one source of all", source.powers)
+
+
+def _terms_of(name: str, curves: Mapping[str, Curve]) -> list[_Term]:
     return [
-        (m.machine.name, what.replace("_", " "), _TERMS[term], value, interval_of(curve, term))
+        (name, what.replace("_", " "), _TERMS[term], value, interval_of(curve, term))
         for what, curve in curves.items()
         for term, value in curve.coefficients.items()
     ]
+
+
+def _told(row: _Term) -> dict[str, Any]:
+    """Coefficient for a file."""
+    return dict(zip(("what", "term", "value", "interval"), row[1:], strict=True))
+
+
+def _dearer(source: Source) -> float:
+    """Compare what heat takes at half load with that at full load, at 7 degC outdoors [-]."""
+    return source.power_by_load(0.5) / source.power_by_load(1.0)
 
 
 def _content(found: Identified, made: Experiment | None, command: str) -> dict[str, Any]:
@@ -226,7 +259,7 @@ def _content(found: Identified, made: Experiment | None, command: str) -> dict[s
         (m.machine.name, _OPERATION[m.operation],
          listed(m.machine.serves) if len(m.machine.serves) < 5 else "all zones",
          m.machine.heat or "not measured", significant(m.standing, 2) if m.standing > _SEEN else "0",
-         significant(m.efficiency(1.0), 3), significant(m.efficiency(0.5), 3))
+         *(significant(m.efficiency(u), 3) if m.powers else "of its source" for u in (1.0, 0.5)))
         for m in found.model.maps
     ]  # fmt: skip
     zones = [

@@ -42,7 +42,8 @@ class IdentifiedProblem:
     Decisions are duties and loads of the machines from 0 to 1, within ends that are parameters of each step, so that
     one of them can be fixed without another problem. Heat and power are the maps at the step's outdoor air and the
     emitter's temperature at its start, power with what `mpc.control.identified.beyond` adds. Bands are those of the
-    air nodes. Machines that setpoints lead keep to what one source has for all of them (`SharedLimit`).
+    air nodes. Machines that setpoints lead keep to what one source has for all of them (`SharedLimit`); what it buys
+    (`Source`) is a line over their load, a parameter of each step.
 
     Parameters
     ----------
@@ -66,6 +67,8 @@ class IdentifiedProblem:
                 most += max(
                     float(found.at(found.powers[CARRIERS[0]], 1.0, OUTDOOR + d, EMITTER)) for d in (-30.0, 10.0)
                 )
+        if model.source is not None:
+            most += float(model.source.at(np.ones(2), OUTDOOR + np.array([-30.0, 10.0]))[:, 0].max())
         return ElectricStage(self.electric, 1.5 * most, model.step)
 
     @property
@@ -113,9 +116,12 @@ class IdentifiedProblem:
         """The problem of a step."""
         model, box = self.model, self.model.box
         nz, ns, m = len(box.zones), len(box.suns), len(model.maps)
-        x, u, sizes = ca.SX.sym("x", 4 * nz), ca.SX.sym("u", m), [1, ns, nz, len(CARRIERS), m, m, m * WEIGHTS, 1]
-        p, added = ca.SX.sym("p", sum(sizes)), self._added
-        outdoor, sun, gain, price, low, high, weights, together = ca.vertsplit(p, np.cumsum([0, *sizes]).tolist())
+        line = len(CARRIERS) if model.source is not None else 0
+        sizes = [1, ns, nz, len(CARRIERS), m, m, m * WEIGHTS, 1, line, line]
+        x, u, p, added = ca.SX.sym("x", 4 * nz), ca.SX.sym("u", m), ca.SX.sym("p", sum(sizes)), self._added
+        outdoor, sun, gain, price, low, high, weights, together, standing, by_load = ca.vertsplit(
+            p, np.cumsum([0, *sizes]).tolist()
+        )
         chosen = low + (high - low) * u
         emitter = REFERENCE + ca.mtimes(ca.DM(box.emitter_weights.T), x)
         heats, cost, electricity = [], ca.SX(0), ca.SX(model.base.get(CARRIERS[0], 0.0))
@@ -129,6 +135,15 @@ class IdentifiedProblem:
                     electricity += power
                 else:
                     cost += price[CARRIERS.index(carrier)] * power
+        shares = shares_of(model.led_heat)
+        total = ca.dot(ca.DM(shares), chosen)
+        for carrier in model.source.powers if model.source is not None else ():
+            place = CARRIERS.index(carrier)
+            power = standing[place] + by_load[place] * total
+            if added is not None and carrier == CARRIERS[0]:
+                electricity += power
+            else:
+                cost += price[place] * power
         inputs = ca.vertcat(outdoor - REFERENCE, sun, *heats, gain)
         transition, drive = self.matrices
         following = ca.mtimes(ca.DM(transition), x) + ca.mtimes(ca.DM(drive), inputs)
@@ -140,8 +155,7 @@ class IdentifiedProblem:
             x, u = ca.vertcat(x, *added.state.values()), ca.vertcat(u, *added.decision.values())
             p = ca.vertcat(p, added.generation)
         cost = SCALE * (cost + _EVEN * ca.sumsqr(u))
-        shares, m = shares_of(model.led_heat), u.numel()
-        within = ca.dot(ca.DM(shares), chosen) - together if shares.any() else ca.SX(0, 1)
+        within, m = total - together if shares.any() else ca.SX(0, 1), u.numel()
         return StageProblem(x, u, p, following, cost, SCALE * end, banded, np.zeros(m), np.ones(m), within)
 
     def data(
@@ -152,6 +166,7 @@ class IdentifiedProblem:
         comfort_price: float,
         ends: tuple[FloatArray, FloatArray],
         now: ElectricNow | None = None,
+        planned: FloatArray | None = None,
     ) -> StageData:
         """Put together what changes.
 
@@ -169,6 +184,8 @@ class IdentifiedProblem:
             Lowest and highest duties and loads of the steps [-].
         now : ElectricNow, optional
             Of what is electric; none generated, nothing stored and no peak by default.
+        planned : ndarray, shape (N,), optional
+            Load of a source at which the lines of its power touch, see `Source.lines` [-].
         """
         box, step, count = self.model.box, self.model.step, len(ahead.outdoor)
         nodes, zones = box.capacity.size, len(box.zones)
@@ -177,6 +194,8 @@ class IdentifiedProblem:
         weights = ahead.beyond.reshape(count, -1)
         together = np.minimum(ahead.together, _UNLIMITED)
         parameters = np.column_stack([ahead.outdoor, ahead.sun, gain, ahead.prices, *ends, weights, together])
+        if self.model.source is not None:
+            parameters = np.column_stack([parameters, *self.model.source.lines(ahead.outdoor, together, planned)])
         # an edge lies in the bands of the step before and of the step after it; nothing can be done about the first
         wanted = np.minimum(ahead.lower + back_off, ahead.upper - _NARROWEST) - REFERENCE
         lower = np.vstack([wanted[:1], np.maximum(wanted[:-1], wanted[1:]), wanted[-1:]])

@@ -6,9 +6,11 @@ from matplotlib.figure import Figure
 
 from calibration.grey_box.fit import follow, predict, run_starts
 from mpc.identify.identify import Identified
-from mpc.identify.maps import MachineMap
+from mpc.identify.shared import shares_of
+from mpc.identify.source import Source
 from mpc.reports.figures import style
 from mpc.reports.figures.style import CELSIUS, MEASURED, MUTED, SIMULATED, Picture, panel, picture, styled
+from thermal._types import BoolArray, FloatArray
 
 _KILO = 1000.0
 
@@ -48,47 +50,70 @@ def error_pictures(found: Identified) -> list[Picture]:
 
 @styled
 def map_pictures(found: Identified) -> list[Picture]:
-    """Draw the map of each machine with its points: what is bought over the load, and heat over what is bought.
+    """Draw the map of each machine, or of the source of all, with its points: what is bought, and heat over that.
 
     Parameters
     ----------
     found : Identified
         Of a plant.
     """
-    drawn, bought = [], found.telemetry.bought
+    outdoor, bought = float(np.median(found.loads.outdoor)), found.telemetry.bought
+    if found.model.source is not None:
+        return [_source_picture(found, found.model.source, outdoor, bought)]
+    drawn = []
     for m, machine in list(enumerate(found.model.maps))[:_DRAWN]:
-        level = found.loads.level[:, m]
-        rows = np.isfinite(level) & (level > 1e-3)
-        figure = Figure(figsize=(9.0, 3.4))
-        left, right = figure.subplots(1, 2)
         own = found.telemetry.column(machine.machine.power) if machine.machine.power else bought
-        shade = found.loads.outdoor[rows] - CELSIUS
-        points = left.scatter(level[rows], own[rows] / _KILO, c=shade, s=9, cmap="viridis", label="measured")
-        u = np.linspace(max(float(np.min(level[rows], initial=1.0)), 0.02), 1.0, 40)
-        outdoor = float(np.median(found.loads.outdoor))
         emitter = float(np.median(found.loads.emitter[:, m]))
+        level = found.loads.level[:, m]
+        u = _line_of(level, 1.0)
         power = sum((curve(1.0, u, outdoor, emitter) for curve in machine.powers.values()), 0.0 * u)
-        left.plot(u, power / _KILO, color=SIMULATED, label="map at the median outdoor air")
-        figure.suptitle(machine.machine.name, x=0.01, ha="left", fontsize=10)
-        left.set(title="what is bought", xlabel="load [-]", ylabel="[kW]", ylim=(0.0, None))
-        left.legend(fontsize=8)
-        _efficiency(right, machine, (u, outdoor, emitter), (level[rows], found.data.heat[rows, m], own[rows], shade))
-        figure.colorbar(points, ax=[left, right], label="outdoor air [°C]", fraction=0.04)
-        drawn.append(picture(figure, f"Power and efficiency of {machine.machine.name} over its load"))
+        efficiency = np.array([machine.efficiency(float(part), outdoor, emitter) for part in u])
+        seen = level, own, found.data.heat[:, m]
+        drawn.append(_map_picture(machine.machine.name, found.loads.outdoor, seen, (u, power, efficiency)))
     return drawn
 
 
-def _efficiency(axes, machine: MachineMap, line, seen) -> None:  # type: ignore[no-untyped-def]
-    """Heat over what is bought."""
-    u, outdoor, emitter = line
-    level, heat, bought, shade = seen
-    there = bought > 0.02 * np.max(bought, initial=1.0)
-    axes.scatter(level[there], heat[there] / bought[there], c=shade[there], s=9, cmap="viridis")
-    values = [machine.efficiency(float(part), outdoor, emitter) for part in u]
-    axes.plot(u, values, color=SIMULATED)
-    axes.set(title="heat over what is bought", xlabel="load [-]", ylabel="[-]")
-    top = float(np.quantile(np.concatenate([heat[there] / bought[there], values]), 0.98)) if there.any() else 1.0
-    axes.set_ylim(0.0, 1.3 * max(top, 0.1))
+def _source_picture(found: Identified, source: Source, outdoor: float, bought: FloatArray) -> Picture:
+    """Draw what one source buys over the load of all its terminals."""
+    model = found.model
+    level = found.loads.level @ shares_of(model.led_heat)
+    u = _line_of(level, source.full)
+    power = source.at(u, outdoor).sum(axis=-1)
+    base = sum(watts for kind, watts in model.base.items() if kind in source.powers)
+    seen = level, bought - base, found.data.heat.sum(axis=1)
+    heat = u * float(model.led_heat.sum())
+    return _map_picture("one source of all", found.loads.outdoor, seen, (u, power, heat / power))
+
+
+def _line_of(level: FloatArray, end: float) -> FloatArray:
+    """Choose loads at which a map is drawn, from the least that was seen on."""
+    return np.linspace(max(float(np.min(level[_rows(level)], initial=end)), 0.02), end, 40)
+
+
+def _rows(level: FloatArray) -> BoolArray:
+    return np.asarray(np.isfinite(level) & (level > 1e-3))
+
+
+def _map_picture(name: str, outdoor: FloatArray, seen: tuple[FloatArray, ...], line: tuple[FloatArray, ...]) -> Picture:
+    """Draw power and efficiency over the load: points of load, power and heat; lines of load, power and efficiency."""
+    rows = _rows(seen[0])
+    level, power, heat = (values[rows] for values in seen)
+    shade = outdoor[rows] - CELSIUS
+    figure = Figure(figsize=(9.0, 3.4))
+    left, right = figure.subplots(1, 2)
+    points = left.scatter(level, power / _KILO, c=shade, s=9, cmap="viridis", label="measured")
+    left.plot(line[0], line[1] / _KILO, color=SIMULATED, label="map at the median outdoor air")
+    figure.suptitle(name, x=0.01, ha="left", fontsize=10)
+    left.set(title="what is bought", xlabel="load [-]", ylabel="[kW]", ylim=(0.0, None))
+    left.legend(fontsize=8)
+    there = power > 0.02 * np.max(power, initial=1.0)
+    right.scatter(level[there], heat[there] / power[there], c=shade[there], s=9, cmap="viridis")
+    right.plot(line[0], line[2], color=SIMULATED)
+    right.set(title="heat over what is bought", xlabel="load [-]", ylabel="[-]")
+    top = float(np.quantile(np.concatenate([heat[there] / power[there], line[2]]), 0.98)) if there.any() else 1.0
+    right.set_ylim(0.0, 1.3 * max(top, 0.1))
+    figure.colorbar(points, ax=[left, right], label="outdoor air [°C]", fraction=0.04)
+    return picture(figure, f"Power and efficiency of {name} over its load")
 
 
 @styled

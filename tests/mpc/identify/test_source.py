@@ -1,0 +1,161 @@
+"""What one source buys for all its terminals: when it is found, its lines, its sums, and plans by its tangents."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from calibration.grey_box.network import GreyBox
+from mpc.control.identified.ahead import Ahead
+from mpc.control.identified.beyond import WEIGHTS
+from mpc.control.identified.controller import IdentifiedController
+from mpc.control.identified.problem import IdentifiedProblem
+from mpc.identify.curves import EMITTER, Curve
+from mpc.identify.machines import Machine
+from mpc.identify.maps import Loads, MachineMap, OwnPower, map_machines
+from mpc.identify.model import PlantModel
+from mpc.identify.source import Source, find_source
+from mpc.loop.actuators import HEATING_SETPOINT, Actuator
+from thermal.case.building import Location
+
+FULL, DAYS, ROOMS = 8e3, 14, ("north", "east", "south", "west")
+N = 96 * DAYS
+MACHINES = [
+    Machine(Actuator(f"{room}/{HEATING_SETPOINT}", "K", 285.15, 298.15), "setpoint", (room,), f"{room}/heat")
+    for room in ROOMS
+]
+
+
+def _loads(seed: int) -> Loads:
+    """Terminals that want heat for some hours, each at its own times."""
+    rng = np.random.default_rng(seed)
+    level = np.repeat(rng.uniform(0.0, 1.0, (N // 8, 4)) * (rng.uniform(size=(N // 8, 4)) < 0.5), 8, axis=0)
+    return Loads(level, 275.0 + np.repeat(rng.normal(0.0, 5.0, DAYS), 96), np.full((N, 4), EMITTER))
+
+
+def _found(loads: Loads, power: np.ndarray, own: bool = False) -> tuple[Source | None, dict[str, float]]:
+    noise = np.random.default_rng(9).normal(0.0, 100.0, N)
+    bought = {"electricity": power + noise}
+    maps, _ = map_machines(MACHINES, loads, FULL * loads.level, bought, np.full((N, 4), np.nan))
+    if own:
+        maps = tuple(replace(m, own=OwnPower(m.powers["electricity"], 0.0)) for m in maps)
+    return find_source(loads, bought, maps, 96)
+
+
+def _heat_pump(load: np.ndarray, outdoor: np.ndarray) -> np.ndarray:
+    """Electricity of one that modulates down to a quarter of its load, below which it switches on and off [W]."""
+    on = np.minimum(load / 0.25, 1.0)
+    return (1500.0 * on + 9000.0 * load) * (1.0 - 0.02 * (outdoor - 280.15))
+
+
+def test_a_heat_pump_is_found_behind_its_terminals() -> None:
+    loads = _loads(0)
+    source, base = _found(loads, 300.0 + _heat_pump(loads.level.mean(axis=1), loads.outdoor))
+    assert source is not None and 0.5 < source.full < 0.7
+    for outdoor in (270.0, 280.0):
+        load = np.array([0.15, 0.3, 0.5, source.full])
+        said, true = base["electricity"] + source.at(load, outdoor)[:, 0], 300.0 + _heat_pump(load, outdoor)
+        assert said == pytest.approx(true, rel=0.08)
+    assert source.power_by_load(0.5) > 1.08 * source.power_by_load(1.0)
+
+
+def _each(loads: Loads) -> np.ndarray:
+    return np.asarray(sum(0.25 * _heat_pump(u, loads.outdoor) for u in loads.level.T))
+
+
+@pytest.mark.parametrize(
+    ("power", "own"),
+    [
+        (lambda loads: FULL * loads.level.sum(axis=1), False),  # electric baseboards
+        (_each, False),  # a heat pump for each room
+        (lambda loads: 4.0 * FULL * 1.1 * loads.level.mean(axis=1), False),  # a boiler as good at part load
+        (lambda loads: FULL * loads.level @ [0.2, 1.0, 0.3, 0.9], False),  # machines of all kinds
+        (lambda loads: _heat_pump(loads.level.mean(axis=1), loads.outdoor), True),  # with sensors of their own
+    ],
+)
+def test_machines_of_their_own_are_none(power, own: bool) -> None:
+    loads = _loads(1)
+    assert _found(loads, power(loads), own) == (None, {})
+
+
+def _source() -> Source:
+    terms = {"command": 13e3, "command^2": -5e3, "outdoor": -3e3, "command^2 outdoor": 2e3}
+    return Source({"electricity": Curve(terms, dict.fromkeys(terms, 0.0))}, 0.7)
+
+
+def test_lines_touch_where_planned_and_lie_nowhere_below() -> None:
+    source, most = _source(), np.full(5, np.inf)
+    outdoor, planned = np.linspace(258.0, 290.0, 5), np.array([0.0, 0.1, 0.4, 0.7, 0.9])
+    at_none, by_load = source.lines(outdoor, most, planned)
+    share, slope = source.lines(outdoor, most)
+    assert not share.any()
+    for load in np.linspace(0.0, 1.2, 25):
+        power = source.at(np.full(5, load), outdoor)
+        assert (at_none + by_load * load >= power - 1e-6).all()
+        assert load > source.full or (slope * load <= power + 1e-6).all()
+    touching = np.minimum(planned, source.full)
+    np.testing.assert_allclose(at_none[:, 0] + by_load[:, 0] * touching, source.at(touching, outdoor)[:, 0])
+    more, less = (source.at(touching - 0.01 + d, outdoor) for d in (1e-4, -1e-4))
+    np.testing.assert_allclose(by_load[1:], ((more - less) / 2e-4)[1:], rtol=0.05)
+    held = source.lines(outdoor, np.full(5, 0.4))[1]
+    np.testing.assert_allclose(held * 0.4, source.at(np.full(5, 0.4), outdoor))  # full load is what there is
+
+
+def _office(source: Source | None) -> PlantModel:
+    heat, per_load = Curve({"command": FULL}, {"command": 0.0}), Curve({"command": 2700.0}, {"command": 0.0})
+    powers = {} if source is not None else {"electricity": per_load}
+    maps = tuple(MachineMap(machine, "setpoint", heat, powers, (-0.1, 0.3)) for machine in MACHINES)
+    serves = {m.name: m.serves for m in MACHINES}
+    box = GreyBox.start(dict.fromkeys(ROOMS, 120.0), (), serves, (True,) * 4)
+    return PlantModel("office", 900.0, box, maps, {"electricity": 300.0}, (), source)
+
+
+def test_what_it_buys_is_shared_out_by_load_and_survives_a_file() -> None:
+    model = _office(_source())
+    levels = np.random.default_rng(3).uniform(0.0, 1.1, (6, 4)) * np.array([1.0, 1.0, 0.0, 1.0])
+    levels[0] = 0.0
+    outdoor = np.linspace(260.0, 285.0, 6)
+    bought = model.bought(np.zeros((6, 16)), levels, outdoor)
+    np.testing.assert_allclose(bought.sum(axis=1), model.source.at(levels.mean(axis=1), outdoor))
+    assert not bought[0].any() and not bought[:, 2].any() and (bought[1:, 0, 0] > 0.0).all()
+    again = PlantModel.from_dict(model.to_dict())
+    assert again.to_dict() == model.to_dict() and again.source == model.source
+    assert PlantModel.from_dict(_office(None).to_dict()).source is None
+
+
+def _ahead(n: int, edge: float = 293.15) -> Ahead:
+    lower = np.full((n, 4), edge)
+    rng = np.random.default_rng(2)
+    price = np.repeat(rng.uniform(0.1, 0.4, (n // 4, 1)), 4, axis=0) * np.ones((1, 3))
+    return Ahead(np.full(n, 271.15), np.zeros((n, 0)), np.zeros((n, 4)), price, lower, lower + 5.0, lower > 0.0,
+                 np.zeros((n, 4, WEIGHTS)), np.full(n, np.inf))  # fmt: skip
+
+
+def test_each_plan_is_no_worse_than_the_one_that_it_begins_from() -> None:
+    """By the power itself; and it costs less than one that takes part load for as good as full load."""
+    model, n = _office(_source()), 48
+    controller = IdentifiedController(
+        model,
+        tuple(m.actuator for m in MACHINES),
+        Location(latitude=50.0, longitude=5.0, elevation=0.0, timezone="Etc/GMT-1"),
+    )
+    problem = IdentifiedProblem(model)
+    controller._kept = np.zeros((n, 4))
+    controller._observer.state = np.concatenate([np.full(16, 0.5), np.zeros(4)])
+    ahead, ends = _ahead(n), (np.zeros((n, 4)), np.ones((n, 4)))
+
+    def costs(plan: np.ndarray) -> float:
+        data = controller._data(ahead, ends, plan)
+        return problem.stage.cost_along(data, problem.stage.follow(data, plan), plan)
+
+    plans, before = [], None
+    for _ in range(4):
+        found = controller._solve_about(before, ahead, ends)
+        assert found is not None and str(found.status) == "converged"
+        before = found.decisions
+        plans.append(costs(before))
+    assert plans[1] < 0.99 * plans[0]  # the first takes any load for as good as full load
+    assert all(b <= a * (1.0 + 1e-6) for a, b in pairwise(plans))
