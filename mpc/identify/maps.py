@@ -225,31 +225,42 @@ def _design(
     return np.column_stack(columns), owners
 
 
-def left_out_error(
-    loads: Loads, values: FloatArray, machines: Sequence[int], per_day: int, *, standing: bool = True
-) -> float:
-    """Mean squared error of a regression on days that it has not seen [W2]: each fifth of the days is left out once.
+def design_of(loads: Loads, machines: Sequence[int], *, standing: bool = True) -> FloatArray:
+    """Columns of a regression, a constant first, shape (n_time, n_column); NaN where a load is unknown.
 
     Parameters
     ----------
     loads : Loads
         Of all machines.
-    values : ndarray, shape (n_time,)
-        Measured [W].
     machines : sequence of int
         Which machines have a part in it.
-    per_day : int
-        Steps of a day.
     standing : bool
         Whether a machine may draw power at any load above 0.
     """
-    known = loads.known & np.isfinite(values)
-    design, _ = _design(loads, known, machines, True, standing)
-    fold, seen = (np.flatnonzero(known) // per_day) % _FOLDS, values[known]
+    columns, _ = _design(loads, loads.known, machines, True, standing)
+    design = np.full((len(loads.level), columns.shape[1]), np.nan)
+    design[loads.known] = columns
+    return design
+
+
+def left_out_error(design: FloatArray, values: FloatArray, per_day: int) -> float:
+    """Mean squared error of a regression on days that it has not seen [W2]: each fifth of the days is left out once.
+
+    Parameters
+    ----------
+    design : ndarray, shape (n_time, n_column)
+        Columns [their own]; rows that are not finite do not count.
+    values : ndarray, shape (n_time,)
+        Measured [W].
+    per_day : int
+        Steps of a day.
+    """
+    rows = np.flatnonzero(np.isfinite(values) & np.isfinite(design).all(axis=1))
+    fold, known, seen = (rows // per_day) % _FOLDS, design[rows], values[rows]
     errors = np.empty(len(seen))
     for k in range(_FOLDS):
         out = fold == k
-        errors[out] = design[out] @ np.linalg.lstsq(design[~out], seen[~out])[0] - seen[out]
+        errors[out] = known[out] @ np.linalg.lstsq(known[~out], seen[~out])[0] - seen[out]
     return float(np.mean(errors**2))
 
 

@@ -177,7 +177,8 @@ def _own_of(entry: Mapping[str, Any] | None) -> OwnPower | None:
 def _source_of(entry: Mapping[str, Any] | None) -> Source | None:
     if entry is None:
         return None
-    return Source({kind: Curve(**curve) for kind, curve in entry["powers"].items()}, float(entry["full"]))
+    curves = {kind: Curve(**curve) for kind, curve in entry["powers"].items()}
+    return Source(curves, float(entry["full"]), float(entry["outdoor"]))
 
 
 def read_model(folder: Path) -> PlantModel:

@@ -111,13 +111,14 @@ def identify_summary(found: Identified, made: Experiment | None) -> dict[str, An
         "machines": {
             m.machine.name: {
                 "operation": m.operation, "standing_power": m.standing,
-                "efficiency": {"full": m.efficiency(1.0), "half": m.efficiency(0.5)} if m.powers else None,
+                "efficiency": None if found.model.source is not None else
+                {"full": m.efficiency(1.0), "half": m.efficiency(0.5)},
                 "terms": [_told(row) for row in _terms(m)],
             }
             for m in found.model.maps
         },
         "source": None if found.model.source is None else {
-            "full_load": found.model.source.full, "half_over_full": _dearer(found.model.source),
+            "full_load": found.model.source.full, "half_over_full": found.model.source.dearer,
             "terms": [_told(row) for row in _source_terms(found.model.source)],
         },
         "time_constants_hours": (box.time_constants / 3600.0).tolist(), "heat_loss": box.heat_loss.tolist(),
@@ -158,7 +159,7 @@ def identify_verdict(found: Identified, made: Experiment | None) -> str:
     if standing:
         text += f"{listed([f'{name} draws {significant(w, 2)} W' for name, w in standing])} at any speed. "
     if found.model.source is not None:
-        text += f"One source feeds them all: at half load its heat takes {percent(_dearer(found.model.source) - 1.0)} "
+        text += f"One source feeds them all: at half load its heat takes {percent(found.model.source.dearer - 1.0)} "
         text += "more than at full load. "
     if made is not None:
         k = experiment_kpis(made)
@@ -247,11 +248,6 @@ def _told(row: _Term) -> dict[str, Any]:
     return dict(zip(("what", "term", "value", "interval"), row[1:], strict=True))
 
 
-def _dearer(source: Source) -> float:
-    """Compare what heat takes at half load with that at full load, at 7 degC outdoors [-]."""
-    return source.power_by_load(0.5) / source.power_by_load(1.0)
-
-
 def _content(found: Identified, made: Experiment | None, command: str) -> dict[str, Any]:
     box, index = found.model.box, found.telemetry.frame.index
     disturbance = box.disturbance
@@ -259,7 +255,7 @@ def _content(found: Identified, made: Experiment | None, command: str) -> dict[s
         (m.machine.name, _OPERATION[m.operation],
          listed(m.machine.serves) if len(m.machine.serves) < 5 else "all zones",
          m.machine.heat or "not measured", significant(m.standing, 2) if m.standing > _SEEN else "0",
-         *(significant(m.efficiency(u), 3) if m.powers else "of its source" for u in (1.0, 0.5)))
+         *("of the source" if found.model.source is not None else significant(m.efficiency(u), 3) for u in (1.0, 0.5)))
         for m in found.model.maps
     ]  # fmt: skip
     zones = [

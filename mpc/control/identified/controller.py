@@ -110,7 +110,7 @@ class IdentifiedController:
     The power of a source that is dear at part load is concave in its load, and such a problem has many local optima. It
     counts by its tangents at the plan before, which lie nowhere below it, so that no plan is worse than the one that it
     begins from (concave-convex procedure, Yuille and Rangarajan 2003, doi:10.1162/08997660360581958). The first plan of
-    all begins from the line through nothing and full load, which lies nowhere above it.
+    all begins from the line through nothing and full load.
 
     Parameters
     ----------
@@ -298,18 +298,29 @@ class IdentifiedController:
     def _solve(self, ahead: Ahead, ends: tuple[FloatArray, FloatArray]) -> StageSolution | None:
         """Plan within ends of the decisions; they are then duties and loads themselves."""
         before = None if self._plan is None else self._plan.shifted()[1]
-        best: StageSolution | None = None
-        for _ in range(1 if self.model.source is None else _PLANS):
+        if self.model.source is None:
+            return self._solve_about(before, ahead, ends)
+        plans: list[StageSolution] = []
+        for _ in range(_PLANS):
             found = self._solve_about(before, ahead, ends)
             if found is None:
                 break
-            best, before = found, found.decisions
-        return best
+            before = found.decisions
+            plans.append(replace(found, cost=self._cost_of(found, ahead)))
+        return min(plans, key=lambda plan: plan.cost, default=None)
+
+    def _cost_of(self, plan: StageSolution, ahead: Ahead) -> float:
+        """Cost of a plan by the power of its source itself, which its tangents at the plan are."""
+        free = np.zeros_like(plan.decisions), np.ones_like(plan.decisions)
+        m = len(self.model.maps)
+        data = self._data(ahead, (free[0][:, :m], free[1][:, :m]), plan.decisions)
+        return self._problem.stage.cost_along(data, plan.states, plan.decisions)
 
     def _solver(self, ahead: Ahead) -> StageSolver:
         """Choose who solves: where a source limits what several machines take, fatrop stalls, and Ipopt does not."""
         count, method = len(ahead.outdoor), _FREE if np.isinf(ahead.together).all() else _LIMITED
         if (count, method) not in self._solvers:
+            self._solvers = {key: solver for key, solver in self._solvers.items() if key[0] == count}
             made = StageSolver(self._problem.stage, count, method, self._tolerance)
             self._solvers[count, method] = made
         return self._solvers[count, method]

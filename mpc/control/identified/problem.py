@@ -68,7 +68,10 @@ class IdentifiedProblem:
                     float(found.at(found.powers[CARRIERS[0]], 1.0, OUTDOOR + d, EMITTER)) for d in (-30.0, 10.0)
                 )
         if model.source is not None:
-            most += float(model.source.at(np.ones(2), OUTDOOR + np.array([-30.0, 10.0]))[:, 0].max())
+            weather, nothing = OUTDOOR + np.array([-30.0, 10.0]), np.zeros(2)
+            most += float(
+                model.source.lines(weather, nothing + np.inf, nothing)[1][:, 0].max()
+            )  # it counts by tangents
         return ElectricStage(self.electric, 1.5 * most, model.step)
 
     @property

@@ -18,6 +18,11 @@ _IDLE = 0.02
 #: How far past the plan a setpoint is told where all heat is wanted [K]: beyond the difference of a thermostat.
 _PUSH = 0.5
 
+#: Part of what a source has for several machines that plans leave for later steps [-]: where all of it is taken,
+#: nothing makes up for what model and forecast have wrong. Chosen on the office's cold weeks, where zones are 0.18 K h
+#: below their band with it and 0.62 without, for 1.2 % more; the only size that was tried.
+_RESERVE = 0.05
+
 
 class Thermostats:
     """Tells zones' own controllers where the air shall be at the end of the step, and learns where they cannot follow.
@@ -59,12 +64,15 @@ class Thermostats:
     def together(self, outdoor: FloatArray) -> FloatArray:
         """Largest load of all machines that are led by a setpoint, shape (N,): a share of their full loads [-].
 
+        Of all steps but the first a twentieth less than is relied on.
+
         Parameters
         ----------
         outdoor : ndarray, shape (N,)
             Outdoor air that is forecast for the coming steps [K].
         """
-        return self._shared.at(outdoor)
+        kept = np.where(np.arange(len(outdoor)) > 0, 1.0 - _RESERVE, 1.0)
+        return np.asarray(kept * self._shared.at(outdoor))
 
     def expect(self, outdoor: FloatArray) -> None:
         """Take a forecast, so that its error is known when its steps have come.

@@ -204,6 +204,8 @@ def test_control_finds_a_source_and_still_knows_what_each_reaches_alone(known: f
         for _ in range(10):
             go(0.1, [0.1] * 4, 291.5)
     assert 0.88 * cap < thermostats.together(here)[0] < 1.02 * cap
+    ahead = thermostats.together(np.repeat(here, 3))
+    assert ahead == pytest.approx(ahead[0] * np.array([1.0, 0.95, 0.95]))  # something is left for errors
     assert thermostats.most(here)[0, 0] >= before - 1e-9
     assert thermostats.shares_all(np.full(4, cap), here) and not thermostats.shares_all(np.full(4, 0.5 * cap), here)
     planned = np.array([[291.0] * 4, [294.0] * 4])

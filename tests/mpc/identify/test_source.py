@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,12 +13,14 @@ from calibration.grey_box.network import GreyBox
 from mpc.control.identified.ahead import Ahead
 from mpc.control.identified.beyond import WEIGHTS
 from mpc.control.identified.controller import IdentifiedController
-from mpc.control.identified.problem import IdentifiedProblem
+from mpc.control.identified.electric import Electric, ElectricNow
+from mpc.errors import ControlError, PlantError
 from mpc.identify.curves import EMITTER, Curve
 from mpc.identify.machines import Machine
-from mpc.identify.maps import Loads, MachineMap, OwnPower, map_machines
+from mpc.identify.maps import Loads, MachineMap, design_of, left_out_error, map_machines
 from mpc.identify.model import PlantModel
 from mpc.identify.source import Source, find_source
+from mpc.identify.telemetry import CARRIERS
 from mpc.loop.actuators import HEATING_SETPOINT, Actuator
 from thermal.case.building import Location
 
@@ -41,7 +44,7 @@ def _found(loads: Loads, power: np.ndarray, own: bool = False) -> tuple[Source |
     bought = {"electricity": power + noise}
     maps, _ = map_machines(MACHINES, loads, FULL * loads.level, bought, np.full((N, 4), np.nan))
     if own:
-        maps = tuple(replace(m, own=OwnPower(m.powers["electricity"], 0.0)) for m in maps)
+        maps = tuple(replace(m, machine=replace(m.machine, power=f"{m.machine.name}/power")) for m in maps)
     return find_source(loads, bought, maps, 96)
 
 
@@ -59,7 +62,7 @@ def test_a_heat_pump_is_found_behind_its_terminals() -> None:
         load = np.array([0.15, 0.3, 0.5, source.full])
         said, true = base["electricity"] + source.at(load, outdoor)[:, 0], 300.0 + _heat_pump(load, outdoor)
         assert said == pytest.approx(true, rel=0.08)
-    assert source.power_by_load(0.5) > 1.08 * source.power_by_load(1.0)
+    assert source.dearer > 1.08 and base["electricity"] == pytest.approx(300.0, abs=150.0)
 
 
 def _each(loads: Loads) -> np.ndarray:
@@ -71,7 +74,6 @@ def _each(loads: Loads) -> np.ndarray:
     [
         (lambda loads: FULL * loads.level.sum(axis=1), False),  # electric baseboards
         (_each, False),  # a heat pump for each room
-        (lambda loads: 4.0 * FULL * 1.1 * loads.level.mean(axis=1), False),  # a boiler as good at part load
         (lambda loads: FULL * loads.level @ [0.2, 1.0, 0.3, 0.9], False),  # machines of all kinds
         (lambda loads: _heat_pump(loads.level.mean(axis=1), loads.outdoor), True),  # with sensors of their own
     ],
@@ -79,6 +81,36 @@ def _each(loads: Loads) -> np.ndarray:
 def test_machines_of_their_own_are_none(power, own: bool) -> None:
     loads = _loads(1)
     assert _found(loads, power(loads), own) == (None, {})
+
+
+def test_a_source_as_good_at_part_load_is_none() -> None:
+    """A boiler whose left-out days the total tells much better: by what it buys at half load it needs no map."""
+    loads = _loads(2)
+    load = loads.level.mean(axis=1)
+    rising = FULL * (2.0 * load + 3.0 * load**2)
+    designs = [design_of(Loads(load[:, None], loads.outdoor, loads.emitter[:, :1]), [0]), design_of(loads, range(4))]
+    errors = [left_out_error(design, rising, 96) for design in designs]
+    assert errors[0] < 0.1 * errors[1] and _found(loads, rising) == (None, {})
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_rooms_that_move_together_beside_metered_lights_are_none(seed: int) -> None:
+    """Baseboards that weather and a morning's boost lead alike, in ten rooms, lights on the same meter."""
+    rng, rooms, days = np.random.default_rng(seed), 10, 7
+    n = 96 * days
+    hour = np.arange(n) % 96 / 4.0
+    outdoor = 275.0 + np.repeat(rng.normal(0.0, 4.0, days), 96) + 3.0 * np.sin(2.0 * np.pi * (hour - 9.0) / 24.0)
+    same = 0.3 + 0.02 * (275.0 - outdoor) + 0.4 * ((hour >= 6.0) & (hour < 8.0))
+    level = np.clip(same[:, None] + rng.normal(0.0, 0.05, (n, rooms)), 0.0, 1.2)
+    loads = Loads(level, outdoor, np.full((n, rooms), EMITTER))
+    lights = 2000.0 * ((hour >= 8.0) & (hour < 18.0))
+    machines = [
+        Machine(Actuator(f"r{k}/{HEATING_SETPOINT}", "K", 285.0, 298.0), "setpoint", (f"r{k}",), f"r{k}/heat")
+        for k in range(rooms)
+    ]
+    bought = {"electricity": 1500.0 * level.sum(axis=1) + lights + rng.normal(0.0, 50.0, n)}
+    maps, _ = map_machines(machines, loads, 1500.0 * level, bought, np.full((n, rooms), np.nan))
+    assert find_source(loads, bought, maps, 96) == (None, {})
 
 
 def _source() -> Source:
@@ -99,9 +131,31 @@ def test_lines_touch_where_planned_and_lie_nowhere_below() -> None:
     touching = np.minimum(planned, source.full)
     np.testing.assert_allclose(at_none[:, 0] + by_load[:, 0] * touching, source.at(touching, outdoor)[:, 0])
     more, less = (source.at(touching - 0.01 + d, outdoor) for d in (1e-4, -1e-4))
-    np.testing.assert_allclose(by_load[1:], ((more - less) / 2e-4)[1:], rtol=0.05)
+    np.testing.assert_allclose(by_load[1:3], ((more - less) / 2e-4)[1:3], rtol=0.05)
     held = source.lines(outdoor, np.full(5, 0.4))[1]
     np.testing.assert_allclose(held * 0.4, source.at(np.full(5, 0.4), outdoor))  # full load is what there is
+
+
+@pytest.mark.parametrize("squared", [-12e3, 4e3])
+def test_a_parabola_that_falls_or_rises_steeply_is_held_concave_and_rising(squared: float) -> None:
+    """Past its vertex nothing more is bought, and where cold bends it upwards it is straight."""
+    source, load = Source({"gas": Curve({"command": 13e3, "command^2": squared}, {})}, 0.7), np.linspace(0.0, 1.2, 60)
+    power = source.at(load, 280.15)[:, CARRIERS.index("gas")]
+    assert (np.diff(power) >= -1e-9).all() and (np.diff(power, 2) <= 1e-9).all() and power[0] == 0.0
+    for planned in (0.0, 0.5, 0.65, 1.0):
+        at_none, by_load = source.lines(np.full(60, 280.15), np.full(60, np.inf), np.full(60, planned))
+        assert (at_none[:, 1] + by_load[:, 1] * load >= power - 1e-6).all() and not by_load[:, 0].any()
+
+
+def test_a_source_that_is_none_is_refused() -> None:
+    with pytest.raises(PlantError, match="full: expected a load above 0, found 0"):
+        Source({}, 0.0)
+    with pytest.raises(PlantError, match="oil"):
+        Source({"oil": Curve({}, {})}, 0.5)
+    content = _office(_source()).to_dict()
+    content["source"]["full"] = -1.0
+    with pytest.raises(ControlError, match="a load above 0"):
+        PlantModel.from_dict(content)
 
 
 def _office(source: Source | None) -> PlantModel:
@@ -134,28 +188,59 @@ def _ahead(n: int, edge: float = 293.15) -> Ahead:
                  np.zeros((n, 4, WEIGHTS)), np.full(n, np.inf))  # fmt: skip
 
 
+def _controller(model: PlantModel, electric: Electric | None = None) -> IdentifiedController:
+    place = Location(latitude=50.0, longitude=5.0, elevation=0.0, timezone="Etc/GMT-1")
+    made = IdentifiedController(model, tuple(m.actuator for m in MACHINES), place, electric=electric)
+    made._kept = np.zeros((48, 4))
+    made._observer.state = np.concatenate([np.full(16, 0.5), np.zeros(4)])
+    return made
+
+
 def test_each_plan_is_no_worse_than_the_one_that_it_begins_from() -> None:
     """By the power itself; and it costs less than one that takes part load for as good as full load."""
-    model, n = _office(_source()), 48
-    controller = IdentifiedController(
-        model,
-        tuple(m.actuator for m in MACHINES),
-        Location(latitude=50.0, longitude=5.0, elevation=0.0, timezone="Etc/GMT-1"),
-    )
-    problem = IdentifiedProblem(model)
-    controller._kept = np.zeros((n, 4))
-    controller._observer.state = np.concatenate([np.full(16, 0.5), np.zeros(4)])
-    ahead, ends = _ahead(n), (np.zeros((n, 4)), np.ones((n, 4)))
-
-    def costs(plan: np.ndarray) -> float:
-        data = controller._data(ahead, ends, plan)
-        return problem.stage.cost_along(data, problem.stage.follow(data, plan), plan)
-
+    controller, ahead, ends = _controller(_office(_source())), _ahead(48), (np.zeros((48, 4)), np.ones((48, 4)))
     plans, before = [], None
     for _ in range(4):
         found = controller._solve_about(before, ahead, ends)
         assert found is not None and str(found.status) == "converged"
         before = found.decisions
-        plans.append(costs(before))
+        plans.append(controller._cost_of(found, ahead))
     assert plans[1] < 0.99 * plans[0]  # the first takes any load for as good as full load
     assert all(b <= a * (1.0 + 1e-6) for a, b in pairwise(plans))
+    assert controller._solve(ahead, ends).cost == pytest.approx(plans[1], rel=1e-6)
+
+
+def test_a_plan_of_a_limited_source_converges_within_it() -> None:
+    """Where loads are counted in parts of what each has; a plan that begins from its own optimum stays there."""
+    controller, n = _controller(_office(_source())), 48
+    ahead = replace(_ahead(n, 292.15), together=np.full(n, 0.3))
+    ends = np.zeros((n, 4)), np.full((n, 4), 1.1) * np.array([1.0, 1.0, 0.5, 1.0])
+    found = controller._solve(ahead, ends)
+    assert found.solver == "ipopt" and str(found.status) == "converged"
+    assert found.decisions.mean(axis=1).max() == pytest.approx(0.3, abs=1e-4) and found.decisions[:, 2].max() <= 0.55
+    again = controller._solve_about(found.decisions, ahead, ends)
+    assert again.iterations < 40 and controller._cost_of(again, ahead) <= found.cost * (1.0 + 1e-6)
+
+
+@pytest.mark.parametrize("kind", ["electricity", "gas"])
+def test_what_is_bought_is_paid_at_its_own_price(kind: str) -> None:
+    """Power of the source itself, by hand, where tangents touch; with a meter for electricity, too."""
+    source = replace(_source(), powers={kind: _source().powers["electricity"]})
+    model, n, levels = _office(source), 48, np.random.default_rng(5).uniform(0.0, 0.8, (48, 4))
+    price = np.tile([0.3, 0.1, 0.0], (n, 1))
+    ahead = replace(_ahead(n, 290.15), prices=price)
+    plan = SimpleNamespace(decisions=levels, states=np.zeros((n + 1, 16)))
+    power = source.at(levels.mean(axis=1), ahead.outdoor).sum(axis=1)
+    expected = (power * price[:, CARRIERS.index(kind)]).sum() * 900.0 / 3.6e6
+    even = 1e-4 * (levels**2).sum()
+    assert _controller(model)._cost_of(plan, ahead) / 10.0 == pytest.approx(expected + even, rel=1e-9)
+    with_meter = _controller(model, Electric(demand=1.0))
+    data = with_meter._problem.data(
+        np.concatenate([np.full(16, 0.5), np.zeros(4)]), ahead, np.zeros((n, 4)), 10.0,
+        (np.zeros((n, 4)), np.ones((n, 4))), ElectricNow(np.zeros(n)), levels.mean(axis=1),
+    )  # fmt: skip
+    whole = np.column_stack([levels, np.zeros((n, with_meter._problem.decisions - 4))])
+    after = with_meter._problem.stage.follow(data, whole)
+    over = after[1:, 16]  # power that machines and all else take, of which nothing is bought here [kW]
+    metered = power if kind == "electricity" else 0.0 * power
+    np.testing.assert_allclose(over, (300.0 + metered) / 1e3, rtol=1e-9)
