@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
@@ -65,6 +66,11 @@ class PlantModel:
         """Full heat of machines that are led by a setpoint, 0 of others, shape (n_machine,) [W]."""
         return led_heat(self.maps)
 
+    @cached_property
+    def shares(self) -> FloatArray:
+        """Of each machine in the load of all that setpoints lead, shape (n_machine,) [-]; see `shares_of`."""
+        return shares_of(self.led_heat)
+
     def heat(self, states: FloatArray, levels: FloatArray, outdoor: FloatArray | float) -> FloatArray:
         """Heat of each machine, or what stands for it where it is not measured, shape (..., n_machine) [W].
 
@@ -99,7 +105,7 @@ class PlantModel:
             for carrier, curve in found.powers.items():
                 powers[..., k, CARRIERS.index(carrier)] = found.at(curve, levels[..., k], outdoor, emitter[..., k])
         if self.source is not None:
-            loads = levels[..., : len(self.maps)] * shares_of(self.led_heat)
+            loads = levels[..., : len(self.maps)] * self.shares
             total = loads.sum(axis=-1)
             by_load = self.source.at(total, outdoor) / np.maximum(total, _NOTHING)[..., None]
             powers += loads[..., None] * by_load[..., None, :]

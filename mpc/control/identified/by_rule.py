@@ -10,7 +10,6 @@ from mpc.control.identified.ahead import Ahead
 from mpc.control.identified.beyond import bought
 from mpc.control.identified.problem import IdentifiedProblem
 from mpc.control.rule_estimate import RuleEstimate
-from mpc.identify.shared import shares_of
 from mpc.scenario.rates import KILOWATT_HOUR
 from thermal._types import FloatArray
 
@@ -58,7 +57,7 @@ def _rule(
     first = 1 + len(model.box.suns)  # of the inputs: outdoor air, suns, heat of the machines, gains
     heated, others = drive[:, first : first + m], np.delete(drive, np.s_[first : first + m], axis=1)
     exogenous = np.column_stack([parameters[:, :1] - REFERENCE, parameters[:, 1 : first + len(zones)]]) @ others.T
-    near, shares = max(round(LEAD / model.step), 1), shares_of(model.led_heat)
+    near, shares = max(round(LEAD / model.step), 1), model.shares
     state, most, runs = start[0], start[1], start[2].astype(bool).copy()
     states, levels = np.empty((count + 1, state.size)), np.zeros((count, len(served)))
     states[0] = state

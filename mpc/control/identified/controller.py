@@ -29,7 +29,6 @@ from mpc.control.solvers.stages import StageData, StageMethod, StageSolution, St
 from mpc.errors import ControlError
 from mpc.identify.maps import MachineMap
 from mpc.identify.model import PlantModel
-from mpc.identify.shared import shares_of
 from mpc.loop.actuators import Actuator, need_actuator
 from mpc.loop.plant import Measurements
 from mpc.scenario.forecast import Forecast
@@ -292,7 +291,7 @@ class IdentifiedController:
     def _data(self, ahead: Ahead, ends: tuple[FloatArray, FloatArray], before: FloatArray | None = None) -> StageData:
         """Fill the problem in, from the state that is estimated; a source counts by its tangents at a plan before."""
         price, state = self.settings.comfort_price, self._observer.state
-        planned = None if before is None else before[:, : len(self.model.maps)] @ shares_of(self.model.led_heat)
+        planned = None if before is None else before[:, : len(self.model.maps)] @ self.model.shares
         return self._problem.data(state, ahead, self._kept, price, ends, self._now, planned)
 
     def _solve(self, ahead: Ahead, ends: tuple[FloatArray, FloatArray]) -> StageSolution | None:
@@ -311,9 +310,8 @@ class IdentifiedController:
 
     def _cost_of(self, plan: StageSolution, ahead: Ahead) -> float:
         """Cost of a plan by the power of its source itself, which its tangents at the plan are."""
-        free = np.zeros_like(plan.decisions), np.ones_like(plan.decisions)
-        m = len(self.model.maps)
-        data = self._data(ahead, (free[0][:, :m], free[1][:, :m]), plan.decisions)
+        free = np.ones((len(plan.decisions), len(self.model.maps)))
+        data = self._data(ahead, (0.0 * free, free), plan.decisions)
         return self._problem.stage.cost_along(data, plan.states, plan.decisions)
 
     def _solver(self, ahead: Ahead) -> StageSolver:

@@ -17,7 +17,6 @@ from mpc.control.identified.electric import Electric, ElectricNow, ElectricStage
 from mpc.control.solvers.stages import StageData, StageProblem
 from mpc.identify.curves import EMITTER, OUTDOOR
 from mpc.identify.model import PlantModel
-from mpc.identify.shared import shares_of
 from mpc.identify.telemetry import CARRIERS
 from mpc.scenario.rates import HOUR, KILOWATT_HOUR
 from thermal._types import FloatArray
@@ -127,26 +126,24 @@ class IdentifiedProblem:
         )
         chosen = low + (high - low) * u
         emitter = REFERENCE + ca.mtimes(ca.DM(box.emitter_weights.T), x)
-        heats, cost, electricity = [], ca.SX(0), ca.SX(model.base.get(CARRIERS[0], 0.0))
+        heats, powers = [], list[tuple[str, ca.SX]]()
         for k, found in enumerate(model.maps):
             heats.append(self.heat(k, chosen[k], outdoor, emitter[k]))
             for carrier, curve in found.powers.items():
                 power = found.at(curve, chosen[k], outdoor, emitter[k])
                 if found.own is not None and carrier == carrier_of(found):
                     power += beyond(weights[k * WEIGHTS : (k + 1) * WEIGHTS], chosen[k])
-                if added is not None and carrier == CARRIERS[0]:
-                    electricity += power
-                else:
-                    cost += price[CARRIERS.index(carrier)] * power
-        shares = shares_of(model.led_heat)
-        total = ca.dot(ca.DM(shares), chosen)
+                powers.append((carrier, power))
+        total = ca.dot(ca.DM(model.shares), chosen)
         for carrier in model.source.powers if model.source is not None else ():
             place = CARRIERS.index(carrier)
-            power = standing[place] + by_load[place] * total
+            powers.append((carrier, standing[place] + by_load[place] * total))
+        cost, electricity = ca.SX(0), ca.SX(model.base.get(CARRIERS[0], 0.0))
+        for carrier, power in powers:
             if added is not None and carrier == CARRIERS[0]:
                 electricity += power
             else:
-                cost += price[place] * power
+                cost += price[CARRIERS.index(carrier)] * power
         inputs = ca.vertcat(outdoor - REFERENCE, sun, *heats, gain)
         transition, drive = self.matrices
         following = ca.mtimes(ca.DM(transition), x) + ca.mtimes(ca.DM(drive), inputs)
@@ -158,7 +155,7 @@ class IdentifiedProblem:
             x, u = ca.vertcat(x, *added.state.values()), ca.vertcat(u, *added.decision.values())
             p = ca.vertcat(p, added.generation)
         cost = SCALE * (cost + _EVEN * ca.sumsqr(u))
-        within, m = total - together if shares.any() else ca.SX(0, 1), u.numel()
+        within, m = total - together if model.shares.any() else ca.SX(0, 1), u.numel()
         return StageProblem(x, u, p, following, cost, SCALE * end, banded, np.zeros(m), np.ones(m), within)
 
     def data(

@@ -6,7 +6,6 @@ from matplotlib.figure import Figure
 
 from calibration.grey_box.fit import follow, predict, run_starts
 from mpc.identify.identify import Identified
-from mpc.identify.shared import shares_of
 from mpc.identify.source import Source
 from mpc.reports.figures import style
 from mpc.reports.figures.style import CELSIUS, MEASURED, MUTED, SIMULATED, Picture, panel, picture, styled
@@ -76,7 +75,7 @@ def map_pictures(found: Identified) -> list[Picture]:
 def _source_picture(found: Identified, source: Source, outdoor: float, bought: FloatArray) -> Picture:
     """Draw what one source buys over the load of all its terminals."""
     model = found.model
-    level = found.loads.level @ shares_of(model.led_heat)
+    level = found.loads.level @ model.shares
     u = _line_of(level, source.full)
     power = source.at(u, outdoor).sum(axis=-1)
     base = sum(watts for kind, watts in model.base.items() if kind in source.powers)
