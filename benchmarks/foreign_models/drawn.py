@@ -1,4 +1,4 @@
-"""Twelve small buildings whose components are drawn at random: four of each thing that heats."""
+"""Twenty small buildings whose components are drawn at random: four of each thing that heats."""
 
 from __future__ import annotations
 
@@ -16,6 +16,11 @@ from foreign_models.heat_pump import HeatPump
 from foreign_models.house import House, house
 from foreign_models.house import description as of_house
 from foreign_models.objects import Fabric
+from foreign_models.office import Office, office
+from foreign_models.office import description as of_office
+from foreign_models.radiators import Dwelling, dwelling
+from foreign_models.radiators import description as of_dwelling
+from foreign_models.rooms import Rooms
 from foreign_models.shop import Shop, shop
 from foreign_models.shop import description as of_shop
 
@@ -32,9 +37,8 @@ PLACES = (
 def drawn_plants() -> dict[str, ForeignPlant]:
     """Draw the buildings by name; the same whatever is done with them."""
     found = {}
-    for number in range(3 * EACH):
+    for number, draw in enumerate([_house, _flats, _shop] * EACH + [_office, _dwelling] * EACH):
         rng = np.random.default_rng([SEED, number])
-        draw = (_house, _flats, _shop)[number % 3]
         about, model, description = draw(rng)
         found[f"drawn_{number + 1}"] = ForeignPlant(about, model, description, str(rng.choice(PLACES)))
     return found
@@ -97,3 +101,44 @@ def _shop(rng: np.random.Generator) -> _Parts:
               capacity, resistance, opens)  # fmt: skip
     about = f"Shop of {of.area:.0f} m2, unitary heat pump of {capacity / 1e3:.1f} kW"
     return about, partial(shop, of), partial(of_shop, of)
+
+
+def _rooms(rng: np.random.Generator, long: tuple[float, float], height: tuple[float, float]) -> Rooms:
+    """Draw two to six rooms, whose sides are within `long` and whose heights are within `height` [m]."""
+    columns, rows = ((2, 1), (3, 1), (1, 2), (2, 2), (3, 2))[int(rng.integers(5))]
+    length, depth, tall = (round(float(rng.uniform(*of)), 1) for of in (long, long, height))
+    share = float(rng.uniform(0.15, 0.35))
+    return Rooms(columns, rows, length, depth, tall, (share * length * tall, share * depth * tall))
+
+
+def _office(rng: np.random.Generator) -> _Parts:
+    """Draw an office with fan coils on one heat pump."""
+    fabric, rooms = _fabric(rng), _rooms(rng, (7.0, 14.0), (2.7, 3.4))
+    count, (walls, glass) = len(rooms.names), rooms.outer
+    need = _loss(fabric, count * rooms.area, 2.0 * count * rooms.area + walls - glass, glass, rooms.height)
+    coil = round(need / count * float(rng.uniform(1.5, 2.5)), -2)
+    machine = HeatPump(
+        round(need * float(rng.uniform(1.7, 2.4)), -2), float(rng.uniform(3.5, 4.8)), float(rng.uniform(0.1, 0.5)),
+        float(rng.uniform(0.2, 0.4)),
+    )  # fmt: skip
+    begin = int(rng.integers(6, 10))
+    of = Office(fabric, rooms, machine, coil, round(rooms.area / float(rng.uniform(10.0, 25.0))),
+                rooms.area * float(rng.uniform(1.0, 5.0)), (begin, begin + int(rng.integers(8, 12))))  # fmt: skip
+    about = (f"Office of {count * rooms.area:.0f} m2, {count} fan coils of {coil / 1e3:.1f} kW, "
+             f"heat pump of {machine.capacity / 1e3:.1f} kW")  # fmt: skip
+    return about, partial(office, of), partial(of_office, of)
+
+
+def _dwelling(rng: np.random.Generator) -> _Parts:
+    """Draw a dwelling with radiators on a gas boiler."""
+    fabric, rooms = _fabric(rng), _rooms(rng, (3.5, 6.5), (2.4, 2.9))
+    count, (walls, glass) = len(rooms.names), rooms.outer
+    need = _loss(fabric, count * rooms.area, 2.0 * count * rooms.area + walls - glass, glass, rooms.height)
+    radiator = round(need / count * float(rng.uniform(1.3, 2.0)), -2)
+    boiler = round(need * float(rng.uniform(1.1, 2.0)), -2)
+    begin = int(rng.integers(6, 10))
+    of = Dwelling(fabric, rooms, radiator, boiler, float(rng.integers(1, 3)), float(rng.uniform(30.0, 120.0)),
+                  (begin, begin + int(rng.integers(0, 10))))  # fmt: skip
+    about = (f"Dwelling of {count * rooms.area:.0f} m2, {count} rooms with radiators of {radiator / 1e3:.1f} kW, "
+             f"gas boiler of {boiler / 1e3:.1f} kW")  # fmt: skip
+    return about, partial(dwelling, of), partial(of_dwelling, of)

@@ -40,7 +40,7 @@ PLANTS = {
     "shop": ForeignPlant("Shop of 216 m2 with a unitary heat pump of 24 kW", shop.shop, shop.description),
 }
 
-#: Those of the table, and twelve that are drawn.
+#: Those of the table, and those that are drawn.
 ALL = PLANTS | drawn_plants()
 
 
@@ -71,7 +71,7 @@ def describe(name: str, errors: str = "day_ahead") -> dict[str, Any]:
         "measurements": told["measurements"] | station,
         "actuators": told["actuators"],
         "energy": told["energy"],
-        "prices": {"electricity": "dynamic", "currency": "EUR"},
+        "prices": {"electricity": "dynamic", "currency": "EUR"} | told.get("prices", {}),
         "series": ["prices.csv"],
         "forecast": {"hours": 24.0, "errors": errors},
     }  # fmt: skip

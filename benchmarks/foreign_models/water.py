@@ -1,4 +1,4 @@
-"""A loop of hot water with one machine, one pump and one or more consumers, as EnergyPlus wants its branches."""
+"""A loop of water with one machine, one pump and one or more consumers, as EnergyPlus wants its branches."""
 
 from __future__ import annotations
 
@@ -7,7 +7,16 @@ from typing import Any
 
 from energyplus_trials.frame import Objects
 
-from foreign_models.objects import merge
+from foreign_models import objects as ep
+
+_RESET = """
+SET wanted_water = {at_zero} - {slope} * outdoor
+SET wanted_water = @Min wanted_water {warmest}
+SET wanted_water = @Max wanted_water {coolest}
+IF told_water > 0.0
+  SET wanted_water = told_water
+ENDIF
+"""
 
 
 def water_loop(
@@ -69,7 +78,7 @@ def water_loop(
     bypass = pipe(f"{name} bypass", f"{name} bypass in", f"{name} bypass out")
     side(f"{name} demand", pipe(f"{name} flow", f"{name} demand in", f"{name} flow out"), [*taking, bypass],
          pipe(f"{name} return", f"{name} return in", f"{name} demand out"))  # fmt: skip
-    merge(found, {
+    ep.merge(found, {
         "PlantEquipmentOperationSchemes": {f"{name} operation": {
             "control_scheme_1_object_type": scheme[0], "control_scheme_1_name": scheme[1],
             "control_scheme_1_schedule_name": "always",
@@ -86,3 +95,76 @@ def water_loop(
         }},
     })  # fmt: skip
     return found
+
+
+def scheduled_loop(
+    name: str, pump: dict[str, Any], machine: tuple[str, str], consumers: Sequence[tuple[str, str]], kind: str,
+    flow: float, water: float,
+) -> Objects:  # fmt: skip
+    """Return the loop of a machine that runs as consumers ask, to a temperature of the schedule ``NAME water``.
+
+    Parameters
+    ----------
+    name, pump, machine, consumers, flow
+        As of `water_loop`.
+    kind : str
+        ``Heating`` or ``Cooling``.
+    water : float
+        Temperature unless something else says it [degC].
+    """
+    scheme = f"PlantEquipmentOperation:{kind}Load"
+    found = water_loop(name, pump, machine, consumers, (scheme, f"{name} load"), flow)
+    ep.merge(found, {
+        scheme: {f"{name} load": {
+            "load_range_1_lower_limit": 0.0, "load_range_1_upper_limit": 1e9,
+            "range_1_equipment_list_name": f"{name} machines",
+        }},
+        "PlantEquipmentList": {f"{name} machines": {
+            "equipment": [{"equipment_object_type": machine[0], "equipment_name": machine[1]}]
+        }},
+        "Schedule:Constant": {f"{name} water": ep.constant(water)},
+        "SetpointManager:Scheduled": {f"{name} setpoint": {
+            "control_variable": "Temperature", "schedule_name": f"{name} water",
+            "setpoint_node_or_nodelist_name": f"{name} supply out",
+        }},
+    })  # fmt: skip
+    return found
+
+
+def supply_water(loop: str, reset: tuple[float, float, float, float]) -> Objects:
+    """Return the program of a loop's supply water: by the outdoor temperature, unless ``SUPPLY WATER`` tells it.
+
+    Parameters
+    ----------
+    loop : str
+        A `scheduled_loop`.
+    reset : tuple of float
+        Warmest water and the outdoor air below which it is that warm, coolest water and the outdoor air above which it
+        is that cool, on a straight line in between [degC].
+    """
+    found: Objects = {"Schedule:Constant": {"SUPPLY WATER": ep.constant(ep.OWN)}}
+    ep.merge(found, ep.sensors({
+        "outdoor": ("Environment", "Site Outdoor Air Drybulb Temperature"),
+        "told_water": ("SUPPLY WATER", "Schedule Value"),
+    }))  # fmt: skip
+    ep.merge(found, ep.actuators({"wanted_water": (f"{loop} water", "Schedule:Constant", "Schedule Value")}))
+    warmest, cold, coolest, mild = reset
+    slope = (warmest - coolest) / (mild - cold)
+    line = {"warmest": warmest, "coolest": coolest, "slope": slope, "at_zero": warmest + slope * cold}
+    ep.merge(found, ep.program("supply_water", _RESET.format(**line)))
+    return found
+
+
+def supply_water_actuator(machine: str, lowest: str, highest: str) -> tuple[str, dict[str, Any]]:
+    """Return the supply water's point and its actuator, as ``plant.yaml`` has them.
+
+    Parameters
+    ----------
+    machine : str
+        Whose water it is.
+    lowest, highest : str
+        Range, with units.
+    """
+    setpoint = f"{machine}/supply_water_temperature_setpoint"
+    signal = "SUPPLY WATER, Schedule:Constant, Schedule Value"
+    return setpoint, {setpoint: {"signal": signal, "range": [lowest, highest]}}
