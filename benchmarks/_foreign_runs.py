@@ -13,10 +13,9 @@ import numpy as np
 import pandas as pd
 from _foreign_do_mpc import DoMpcController
 from _foreign_rules import ProportionalIntegral
-from foreign_models.periods import DAYS, starts
+from foreign_models.periods import DAYS
 from foreign_models.plants import ALL, write_plant
 
-from mpc.adapters.energyplus.input import weather_path
 from mpc.baselines.plants import LEAD, FullSpeed, OwnControl
 from mpc.control.identified.conformal import ConformalBackOff
 from mpc.control.identified.controller import IdentifiedSettings
@@ -30,7 +29,8 @@ from mpc.loop.plant import Controller, Measurements
 from mpc.loop.run import ClosedLoopRun
 from mpc.scenario.forecast import Forecast
 from mpc.scenario.scenario import Scenario
-from mpc.studies.described import PlantStudy, experiment_period, run_experiment
+from mpc.studies.described import PlantStudy
+from mpc.studies.excited import experiment_period, run_experiment
 
 #: Length of the experiment that a plant is identified on [d].
 EXPERIMENT = 14
@@ -89,8 +89,8 @@ def settings_of(controller: str) -> tuple[str, IdentifiedSettings | None]:
 
 
 def run(name: str, which: str, controller: str, out: Path) -> dict[str, Any]:
-    """Let a controller run a plant in its ``coldest`` or ``typical`` period; optimal control is identified first."""
-    begin = pd.Timestamp(starts(weather_path(ALL[name].weather))[which])
+    """Let a controller run a plant in one of its periods; optimal control is identified first."""
+    begin = pd.Timestamp(ALL[name].starts[which])
     kind, settings = settings_of(controller)
     loop, scenario, timed, spent = drive(name, kind, out, begin, DAYS, settings)
     return account(loop, scenario, timed.seconds) | spent
@@ -116,7 +116,8 @@ def drive(
     if controller == "sac" and model is not None:
         spent = spent | trained(name, path, model)
     first, last = (f"{day:%Y-%m-%d}" for day in (begin, begin + pd.Timedelta(days=days)))
-    study = PlantStudy(path, start=first, end=last, model=model, settings=settings or IdentifiedSettings())
+    study = PlantStudy(path, start=first, end=last, model=model, settings=settings or IdentifiedSettings(),
+                       cooling=ALL[name].cooled)  # fmt: skip
     with study.plant() as plant:
         timed = Timed(CONTROLLERS[controller](study, plant))
         if kept is not None:
@@ -138,7 +139,7 @@ def identified(name: str, out: Path) -> tuple[PlantModel, dict[str, Any]]:
     file = folder / "spent.json"
     if not file.exists():
         begin = time.process_time()
-        study = PlantStudy(path, None, *experiment_period(path, None, EXPERIMENT))
+        study = PlantStudy(path, None, *experiment_period(path, None, EXPERIMENT), cooling=ALL[name].cooled)
         made = run_experiment(study, EXPERIMENT, ExcitationSettings())
         found = identify(made.telemetry, made.machines)
         folder.mkdir(parents=True, exist_ok=True)

@@ -15,12 +15,11 @@ import gymnasium
 import numpy as np
 import pandas as pd
 import torch
-from foreign_models.periods import DAYS, starts
+from foreign_models.periods import DAYS
 from foreign_models.plants import PLANTS
 from stable_baselines3 import SAC
 
 from calibration.estimation.state_space import REFERENCE
-from mpc.adapters.energyplus.input import weather_path
 from mpc.control.identified.ahead import Ahead
 from mpc.control.identified.controller import IdentifiedSettings
 from mpc.control.identified.observer import GreyBoxObserver
@@ -175,7 +174,7 @@ def train(name: str, path: Path, model: PlantModel, file: Path, seed: int = 0) -
     ahead = Ahead.of(model, Forecaster(scenario, steps).table(0), season.site.location)
     stamps = scenario.grid.stamps - pd.Timedelta(seconds=model.step)
     first = stamps[0].normalize()
-    taken = [pd.Timestamp(day, tz=stamps.tz) for day in starts(weather_path(PLANTS[name].weather)).values()]
+    taken = [pd.Timestamp(day, tz=stamps.tz) for day in PLANTS[name].starts.values()]
     days = []
     for day in range(steps * int(model.step) // 86_400 - EPISODE - 1):
         at = first + pd.Timedelta(days=day)

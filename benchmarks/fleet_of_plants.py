@@ -23,10 +23,8 @@ from _code import code
 from _foreign_runs import account, drive, identified
 from _table import keep, markdown, write
 from foreign_models.drawn import drawn_plants
-from foreign_models.periods import starts
 from foreign_models.plants import ALL
 
-from mpc.adapters.energyplus.input import weather_path
 from mpc.errors import EnergyPlusError, MpcError
 
 DAYS = 7
@@ -41,7 +39,7 @@ def perform(name: str, out: Path, days: int) -> dict[str, Any]:
     if path.exists():
         return dict(json.loads(path.read_text(encoding="utf-8")))
     data: dict[str, Any] = {"building": name, "about": ALL[name].about, "days": days, "code": code()}
-    begin = pd.Timestamp(starts(weather_path(ALL[name].weather))["coldest"])
+    begin = pd.Timestamp(next(iter(ALL[name].starts.values())))
     stage = "identify"
     try:
         data["identify_cpu_seconds"] = identified(name, out)[1]["identify_cpu_seconds"]

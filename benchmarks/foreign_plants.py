@@ -36,7 +36,7 @@ from foreign_models.plants import PLANTS
 
 from mpc.errors import EnergyPlusError, MpcError
 
-PERIODS = ("coldest", "typical")
+PERIODS = ("coldest", "hottest", "typical")
 TITLES = {
     "own": "own control", "rule": "full speed or set-back, lead 3 h", "long rule": "the same, lead 6 h", "pi": "PI",
     "mpc": "MPC, identified", "mpc perfect": "the same, weather known",
@@ -117,7 +117,7 @@ def main(arguments: list[str] | None = None) -> int:
     runs = []
     try:
         for name in options.plants:
-            for which in options.periods:
+            for which in (period for period in options.periods if period in PLANTS[name].starts):
                 for controller in wanted(name, options.controllers + told):
                     if options.finished and not file_of(name, which, controller, options.out).exists():
                         continue

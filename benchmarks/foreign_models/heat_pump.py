@@ -1,7 +1,8 @@
-"""An air-to-water heat pump as EnergyPlus' ``HeatPump:PlantLoop:EIR:Heating``, whose curves follow a stated law."""
+"""Air-to-water heat pumps and chillers as EnergyPlus' ``HeatPump:PlantLoop:EIR``, whose curves follow a stated law."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -47,12 +48,12 @@ class HeatPump:
         The capacity is linear in both. The electric input per heat is that of a constant share of Carnot's efficiency
         between condensation and evaporation, fitted by least squares over the ranges of the curves.
         """
-        water, air = (a.ravel() for a in np.meshgrid(np.linspace(*_WATER, 21), np.linspace(*_AIR, 21)))
-        terms = np.column_stack([np.ones_like(water), water, water**2, air, air**2, water * air])
-        capacity = 1.0 + self.per_air * (air - _RATED[1]) + self.per_water * (water - _RATED[0])
-        at_rating = _per_heat(np.array(_RATED[0]), np.array(_RATED[1]))
-        values = {"capacity": capacity, "input": _per_heat(water, air) / at_rating}
-        return {name: np.linalg.lstsq(terms, value, rcond=None)[0] for name, value in values.items()}
+        return _fitted(self.at, (self.per_water, self.per_air), _per_heat)
+
+    @property
+    def at(self) -> tuple[tuple[float, float], ...]:
+        """Water and air of the rating point, and ranges of water and of air [degC]."""
+        return _RATED, _WATER, _AIR
 
     def part_load(self) -> tuple[float, float, float]:
         """Coefficients of the electric input per heat over part load, EnergyPlus' order of ``Curve:Exponent``.
@@ -60,6 +61,49 @@ class HeatPump:
         EnergyPlus multiplies the heat that is given by it: a standing share s of the full power needs 1 - s + s / PLR.
         """
         return 1.0 - self.standing, self.standing, -1.0
+
+
+@dataclass(frozen=True)
+class Chiller(HeatPump):
+    """A chiller in outdoor air at its rating point, water at 7 and air at 35 degC (EN 14511); parameters of `HeatPump`.
+
+    Parameters
+    ----------
+    per_air : float
+        What a kelvin of outdoor air adds to the capacity, of that at the rating point [1/K].
+    per_water : float
+        What a kelvin of supply water adds [1/K].
+    """
+
+    per_air: float = -0.009
+    per_water: float = 0.03
+
+    def curves(self) -> dict[str, np.ndarray]:
+        """As of a heat pump, of the cold that it gives."""
+        return _fitted(self.at, (self.per_water, self.per_air), _per_cold)
+
+    @property
+    def at(self) -> tuple[tuple[float, float], ...]:
+        """Water and air of the rating point, and ranges of water and of air [degC]."""
+        return (7.0, 35.0), (4.0, 15.0), (5.0, 45.0)
+
+
+def _fitted(
+    at: tuple[tuple[float, float], ...], slopes: tuple[float, float],
+    per: Callable[[np.ndarray, np.ndarray], np.ndarray],
+) -> dict[str, np.ndarray]:  # fmt: skip
+    """Fit biquadratics of capacity and electric input over water and air."""
+    rated, *ranges = at
+    water, air = (a.ravel() for a in np.meshgrid(*(np.linspace(*ends, 21) for ends in ranges)))
+    terms = np.column_stack([np.ones_like(water), water, water**2, air, air**2, water * air])
+    capacity = 1.0 + slopes[1] * (air - rated[1]) + slopes[0] * (water - rated[0])
+    values = {"capacity": capacity, "input": per(water, air) / per(np.array(rated[0]), np.array(rated[1]))}
+    return {name: np.linalg.lstsq(terms, value, rcond=None)[0] for name, value in values.items()}
+
+
+def _per_cold(water: np.ndarray, air: np.ndarray) -> np.ndarray:
+    """Electric input per heat that is taken, of an ideal machine [-]."""
+    return np.asarray((air - water + 2.0 * _LIFT) / (water - _LIFT + 273.15))
 
 
 def _per_heat(water: np.ndarray, air: np.ndarray) -> np.ndarray:
@@ -85,12 +129,12 @@ def heat_pump(name: str, machine: HeatPump, flow: float) -> Objects:
                 "coefficient6_x_y")  # fmt: skip
         curves[f"{name} {what}"] = dict(zip(keys, (float(round(v, 9)) for v in values), strict=True)) | dict(
             zip(("minimum_value_of_x", "maximum_value_of_x", "minimum_value_of_y", "maximum_value_of_y"),
-                (*_WATER, *_AIR), strict=True)
+                (*machine.at[1], *machine.at[2]), strict=True)
         )  # fmt: skip
     keys = ("coefficient1_constant", "coefficient2_constant", "coefficient3_constant")
     part_load = dict(zip(keys, machine.part_load(), strict=True))
     return {
-        "HeatPump:PlantLoop:EIR:Heating": {name: {
+        f"HeatPump:PlantLoop:EIR:{'Cooling' if isinstance(machine, Chiller) else 'Heating'}": {name: {
             "load_side_inlet_node_name": f"{name} in", "load_side_outlet_node_name": f"{name} out",
             "condenser_type": "AirSource", "source_side_inlet_node_name": f"{name} outdoor",
             "source_side_outlet_node_name": f"{name} exhaust", "load_side_reference_flow_rate": flow,

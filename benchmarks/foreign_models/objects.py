@@ -275,6 +275,31 @@ def sensors(listed: Mapping[str, tuple[str, str]]) -> Objects:
     }}  # fmt: skip
 
 
+def summed(title: str, terms: Mapping[str, tuple[str, str, float]]) -> Objects:
+    """Return an output of our own, ``EMS, TITLE``: a sum of outputs of EnergyPlus.
+
+    Parameters
+    ----------
+    title : str
+        Of the output [W].
+    terms : mapping of str to tuple
+        By a name without spaces: key, output variable, and factor [-].
+    """
+    name = title.lower().replace(" ", "_")
+    parts = {f"{name}_{term}": (key, variable) for term, (key, variable, _) in terms.items()}
+    total = " + ".join(f"{factor:g} * {name}_{term}" for term, (_, _, factor) in terms.items())
+    found = sensors(parts)
+    merge(found, program(f"{name}_sum", f"SET {name} = {total}", "EndOfSystemTimestepAfterHVACReporting"))
+    merge(found, {
+        "EnergyManagementSystem:GlobalVariable": {f"{name} variable": {"variables": [{"erl_variable_name": name}]}},
+        "EnergyManagementSystem:OutputVariable": {title: {
+            "ems_variable_name": name, "type_of_data_in_variable": "Averaged", "update_frequency": "SystemTimestep",
+            "units": "W",
+        }},
+    })  # fmt: skip
+    return found
+
+
 def actuators(listed: Mapping[str, tuple[str, str, str]]) -> Objects:
     """Return actuators of the energy management system.
 

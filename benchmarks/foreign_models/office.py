@@ -8,13 +8,14 @@ from typing import Any
 from energyplus_trials.frame import Objects
 
 from foreign_models import objects as ep
-from foreign_models.heat_pump import HeatPump, heat_pump
+from foreign_models.heat_pump import Chiller, HeatPump, heat_pump
 from foreign_models.rooms import Rooms
-from foreign_models.thermostats import clock, comfort, present, thermostat, thermostat_points
+from foreign_models.thermostats import COOLING, clock, comfort, cooling_clock, present, thermostat, thermostat_points
 from foreign_models.water import scheduled_loop, supply_water, supply_water_actuator
 
 FABRIC = ep.Fabric(wall=0.06, roof=0.12, floor=0.06, glass=(1.8, 0.4), air_changes=0.5, goods=3.0)
 ROOMS = Rooms(columns=2, rows=2, length=12.0, depth=10.0, height=3.0, glass=(10.0, 8.0))
+_CHILLER = "COLD"
 PUMP, MACHINE = "HEAT PUMP", HeatPump(capacity=40_000.0, cop=4.0, standing=0.15, minimum=0.2)
 #: A coil of 10 kW from water at 45 degC: air [m3/s], water [m3/s], conductance [W/K].
 _COIL, _AIR, _WATER, _CONDUCTANCE = 10_000.0, 0.6, 4.5e-4, 850.0
@@ -23,6 +24,7 @@ _PUMPS = 150.0 / 40_000.0  # W per W of the coils, each
 #: Own supply water: 45 degC at -10 degC outdoors, 35 at 15, on a straight line.
 RESET = (45.0, -10.0, 35.0, 15.0)
 NOBODY = [False] * 24
+_HEAT = "{} heat"  # of a fan coil: negative where it cools
 _HOT, _COLD, _UNIT = "Coil:Heating:Water", "Coil:Cooling:Water", "ZoneHVAC:FourPipeFanCoil"
 
 
@@ -44,6 +46,9 @@ class Office:
         Of a room, and heat that nothing measures [W].
     hours : tuple of int
         From which and until which people are in on working days.
+    chiller : Chiller or None
+        That cools the water of an office that is looked at in summer: it is cooled to 24 degC while people are in, and
+        its cooling is measured and told. None buys chilled water.
     """
 
     fabric: ep.Fabric = FABRIC
@@ -53,6 +58,7 @@ class Office:
     people: float = 8.0
     appliances: float = 250.0
     hours: tuple[int, int] = (8, 18)
+    chiller: Chiller | None = None
 
     @property
     def work(self) -> list[bool]:
@@ -78,13 +84,20 @@ class Office:
 def office(of: Office | None = None) -> Objects:
     """Return the input of an office, by default of the one in the table."""
     of = of or Office()
-    model, listed = ep.start(of.fabric), of.rooms.names
+    model, listed, cooling = ep.start(of.fabric), of.rooms.names, (COOLING, COOLING)
+    if of.chiller is not None:
+        cooling = cooling_clock(of.work), cooling_clock(NOBODY)
     for number, zone in enumerate(listed):
         ep.merge(model, of.rooms.box(number, listed))
         ep.merge(model, ep.inside(zone, of.fabric, of.rooms.area, of.people, "presence", of.appliances))
-        ep.merge(model, thermostat(zone, clock(of.work), clock(NOBODY), cooled=True))
+        ep.merge(model, thermostat(zone, clock(of.work), clock(NOBODY), cooling))
         ep.merge(model, ep.equipment(zone, [(_UNIT, f"{zone} fan coil")], f"{zone} unit out", f"{zone} unit in"))
         ep.merge(model, _fan_coil(of, zone))
+        if of.chiller is not None:
+            ep.merge(model, ep.summed(_HEAT.format(zone), {
+                "heating": (f"{zone} fan coil", "Fan Coil Heating Rate", 1.0),
+                "cooling": (f"{zone} fan coil", "Fan Coil Sensible Cooling Rate", -1.0),
+            }))  # fmt: skip
     ep.merge(model, {
         "Schedule:Compact": {"presence": ep.daily([float(on) for on in of.work], [0.0] * 24)},
         "Schedule:Constant": {"fan cycles": ep.constant(0.0)},
@@ -92,11 +105,14 @@ def office(of: Office | None = None) -> Objects:
     ep.merge(model, heat_pump(PUMP, of.machine, of.flow))
     machine, coils = ("HeatPump:PlantLoop:EIR:Heating", PUMP), (_HOT, "hot coil")
     ep.merge(model, _loop(of, "HOT LOOP", "Heating", machine, coils, 40.0))
-    ep.merge(model, _loop(of, "COLD LOOP", "Cooling", ("DistrictCooling", "COLD"), (_COLD, "cold coil"), 7.0))
-    ep.merge(model, {"DistrictCooling": {"COLD": {
-        "chilled_water_inlet_node_name": "COLD in", "chilled_water_outlet_node_name": "COLD out",
-        "nominal_capacity": of.coil * len(listed),
-    }}})  # fmt: skip
+    machine = ("DistrictCooling" if of.chiller is None else "HeatPump:PlantLoop:EIR:Cooling", _CHILLER)
+    ep.merge(model, _loop(of, "COLD LOOP", "Cooling", machine, (_COLD, "cold coil"), 7.0))
+    ep.merge(model, heat_pump(_CHILLER, of.chiller, of.flow) if of.chiller is not None else {
+        "DistrictCooling": {_CHILLER: {
+            "chilled_water_inlet_node_name": f"{_CHILLER} in", "chilled_water_outlet_node_name": f"{_CHILLER} out",
+            "nominal_capacity": of.coil * len(listed),
+        }},
+    })  # fmt: skip
     ep.merge(model, supply_water("HOT LOOP", RESET))
     return model
 
@@ -163,13 +179,16 @@ def description(of: Office | None = None) -> dict[str, Any]:
             "volume": of.rooms.area * of.rooms.height, "comfort": comfort(of.work, NOBODY),
             "people": present(of.people, of.work, NOBODY),
         }  # fmt: skip
-        measured, acted = thermostat_points(zone, name)
+        measured, acted = thermostat_points(zone, name, cooled=of.chiller is not None)
+        heat = f"{zone} fan coil, Fan Coil Heating Rate" if of.chiller is None else f"EMS, {_HEAT.format(zone)}"
         told["measurements"] |= measured | {
-            f"{name}/heating_power_sensor": f"{zone} fan coil, Fan Coil Heating Rate",
+            f"{name}/heating_power_sensor": heat,
             f"{name}/supply_fan_power_sensor": fan,
         }
         told["actuators"] |= acted
         electricity.append(fan)
+    if of.chiller is not None:
+        electricity.append(f"{_CHILLER}, Heat Pump Electricity Rate")
     setpoint, acted = supply_water_actuator("heat_pump", "30 degC", "50 degC")
     told["measurements"] |= {
         "heat_pump/electrical_power_sensor": power, "hot_water/pump_power_sensor": pump,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,8 @@ from energyplus_trials.frame import STEPS_PER_HOUR
 from foreign_models import flats, house, office, shop
 from foreign_models.drawn import drawn_plants
 from foreign_models.foreign_plant import ForeignPlant
-from foreign_models.periods import DAYS, WARM_UP, starts
+from foreign_models.heat_pump import Chiller
+from foreign_models.periods import DAYS, WARM_UP
 from foreign_models.prices import dynamic_prices
 from mpc.adapters.energyplus.input import weather_path
 from mpc.scenario.weather_files import read_epw
@@ -27,6 +29,8 @@ STATION = {
 }
 
 
+SUMMER, COOLED = shop.Shop(cooled=True), office.Office(chiller=Chiller(40_000.0, 3.2, standing=0.15, minimum=0.2))
+
 PLANTS = {
     "house": ForeignPlant(
         "House of 192 m2 for five, heated floor, air-to-water heat pump of 12 kW", house.house, house.description
@@ -38,6 +42,15 @@ PLANTS = {
         office.description,
     ),
     "shop": ForeignPlant("Shop of 216 m2 with a unitary heat pump of 24 kW", shop.shop, shop.description),
+    "cooled_shop": ForeignPlant(
+        "The same shop in summer", partial(shop.shop, SUMMER), partial(shop.description, SUMMER), cooled=True
+    ),
+    "cooled_office": ForeignPlant(
+        "The same office in summer, with a chiller of 40 kW",
+        partial(office.office, COOLED),
+        partial(office.description, COOLED),
+        cooled=True,
+    ),
 }
 
 #: Those of the table, and those that are drawn.
@@ -45,7 +58,7 @@ ALL = PLANTS | drawn_plants()
 
 
 def describe(name: str, errors: str = "day_ahead") -> dict[str, Any]:
-    """Return the ``plant.yaml`` of a plant, in the coldest two weeks.
+    """Return the ``plant.yaml`` of a plant, in the coldest two weeks, or the hottest.
 
     Parameters
     ----------
@@ -66,7 +79,7 @@ def describe(name: str, errors: str = "day_ahead") -> dict[str, Any]:
         "plant": {"kind": "energyplus", "model": f"{name}.epJSON", "weather": plant.weather,
                   "steps_per_hour": STEPS_PER_HOUR},
         "control_step": 900.0,
-        "period": {"start": starts(weather)["coldest"], "days": DAYS, "warm_up_days": WARM_UP},
+        "period": {"start": next(iter(plant.starts.values())), "days": DAYS, "warm_up_days": WARM_UP},
         "zones": told["zones"],
         "measurements": told["measurements"] | station,
         "actuators": told["actuators"],

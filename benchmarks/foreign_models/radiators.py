@@ -82,7 +82,10 @@ def dwelling(of: Dwelling | None = None) -> Objects:
         ep.merge(model, ep.equipment(zone, [(_RADIATOR, f"{zone} radiator")]))
         ep.merge(model, {"Schedule:Compact": {f"{zone} presence": ep.daily(*_shares(hours))}})
         ep.merge(model, _radiator(zone, of.radiator, flow))
-        ep.merge(model, _heat(zone))
+        ep.merge(model, ep.summed(f"{zone} heat", {  # EnergyPlus' own total has little of what radiates
+            kind: (f"{zone} radiator", f"Baseboard {kind.title()} Heating Rate", 1.0)
+            for kind in ("convective", "radiant")
+        }))  # fmt: skip
     ep.merge(model, {f"{_RADIATOR}:Design": {"radiators": {
         "heating_design_capacity_method": "HeatingDesignCapacity", "fraction_radiant": _RADIANT,
         "fraction_of_radiant_energy_incident_on_people": 0.0,
@@ -113,27 +116,6 @@ def _radiator(zone: str, capacity: float, flow: float) -> Objects:
             for face in ("floor", "ceiling")
         ],
     }}}  # fmt: skip
-
-
-def _heat(zone: str) -> Objects:
-    """Return the output ``ZONE heat``: all that a radiator gives; EnergyPlus' own total has little of what radiates."""
-    name = zone.lower()
-    parts = {f"{name}_{kind}": (f"{zone} radiator", f"Baseboard {kind.title()} Heating Rate")
-             for kind in ("convective", "radiant")}  # fmt: skip
-    found = ep.sensors(parts)
-    ep.merge(found, ep.program(
-        f"{name}_sum", f"SET {name}_heat = {' + '.join(parts)}", "EndOfSystemTimestepAfterHVACReporting"
-    ))  # fmt: skip
-    ep.merge(found, {
-        "EnergyManagementSystem:GlobalVariable": {f"{name} variable": {
-            "variables": [{"erl_variable_name": f"{name}_heat"}]
-        }},
-        "EnergyManagementSystem:OutputVariable": {f"{zone} heat": {
-            "ems_variable_name": f"{name}_heat", "type_of_data_in_variable": "Averaged",
-            "update_frequency": "SystemTimestep", "units": "W",
-        }},
-    })  # fmt: skip
-    return found
 
 
 def _boiler(capacity: float, flow: float) -> Objects:

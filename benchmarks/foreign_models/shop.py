@@ -8,7 +8,7 @@ from typing import Any
 from energyplus_trials.frame import Objects
 
 from foreign_models import objects as ep
-from foreign_models.thermostats import clock, comfort, present, thermostat, thermostat_points
+from foreign_models.thermostats import COOLING, clock, comfort, cooling_clock, present, thermostat, thermostat_points
 from mpc.adapters.energyplus.input import InputFile, building_path, read_input
 
 ZONE, UNIT = "SHOP", "HEAT PUMP"
@@ -18,6 +18,7 @@ _FAN = (250.0, 0.5)  # Pa, and total efficiency [-]: 600 W at 1.2 m3/s
 _FLOW = 0.05  # m3/s of air per kW: usual of packaged units
 #: Whose compressor curves the unit has.
 SOURCE = "ASHRAE901_OfficeSmall_STD2019_Denver"
+_HEAT = "SHOP heat"  # of the unit: negative where it cools
 _HEATING, _COOLING = "Coil:Heating:DX:SingleSpeed", "Coil:Cooling:DX:SingleSpeed"
 
 
@@ -37,6 +38,8 @@ class Shop:
         Customers and staff, and heat of lights and tills that nothing measures [W].
     capacity, resistance : float
         Of the compressor at 8.3 degC outdoors, and of what is let in below `_LET_IN` [W].
+    cooled : bool
+        Whether it is looked at in summer: cooled to 24 degC while it is open, and its cooling is measured and told.
     opens : tuple of int
         Hours from which and until which it is open on working days; at week-ends from an hour later to two earlier.
     """
@@ -51,6 +54,7 @@ class Shop:
     capacity: float = 24_000.0
     resistance: float = 8_000.0
     opens: tuple[int, int] = (8, 20)
+    cooled: bool = False
 
     @property
     def air(self) -> float:
@@ -76,14 +80,18 @@ class Shop:
 def shop(of: Shop | None = None) -> Objects:
     """Return the input of a shop, by default of the one in the table."""
     of = of or Shop()
-    model = ep.start(of.fabric)
+    model, cooling = ep.start(of.fabric), (COOLING, COOLING)
+    if of.cooled:
+        cooling = cooling_clock(of.weekday), cooling_clock(of.weekend)
     parts: list[Any] = [
         ep.box(ZONE, (0.0, 0.0), (of.length, of.depth, of.height), {"south": of.glass}, {"east": "", "west": ""}),
         ep.inside(ZONE, of.fabric, of.area, of.people, "presence", of.appliances),
-        thermostat(ZONE, clock(of.weekday), clock(of.weekend), cooled=True),
+        thermostat(ZONE, clock(of.weekday), clock(of.weekend), cooling),
         ep.equipment(ZONE, [("AirLoopHVAC:UnitarySystem", UNIT)], f"{UNIT} out", f"{UNIT} in"),
         {"Schedule:Compact": {"presence": ep.daily([float(h) for h in of.weekday], [float(h) for h in of.weekend])}},
         _unit(of), *_coils(of),
+        ep.summed(_HEAT, {kind: (UNIT, f"Unitary System Sensible {kind.title()} Rate", sign)
+                          for kind, sign in (("heating", 1.0), ("cooling", -1.0))}),
     ]  # fmt: skip
     for part in parts:
         ep.merge(model, part)
@@ -165,7 +173,8 @@ def data_sheet(of: Shop) -> list[list[float | str]]:
 def description(of: Shop | None = None) -> dict[str, Any]:
     """Return what ``plant.yaml`` says of zones, points and actuators."""
     of = of or Shop()
-    measured, acted = thermostat_points(ZONE, "shop")
+    measured, acted = thermostat_points(ZONE, "shop", cooled=of.cooled)
+    heat = f"EMS, {_HEAT}" if of.cooled else f"{UNIT}, Unitary System Total Heating Rate"
     power = [f"{UNIT}, Unitary System Electricity Rate"]
     return {
         "zones": {"shop": {
@@ -176,9 +185,10 @@ def description(of: Shop | None = None) -> dict[str, Any]:
         "measurements": measured | {
             "heat_pump/electrical_power_sensor": power[0],
             "heat_pump/supply_fan_power_sensor": f"{UNIT} fan, Fan Electricity Rate",
-            "heat_pump/heating_power_sensor": f"{UNIT}, Unitary System Total Heating Rate",
+            "heat_pump/heating_power_sensor": heat,
             "heat_pump/supply_air_temperature_sensor": f"{UNIT} out, System Node Temperature",
         },
-        "actuators": {name: entry | {"capacity": data_sheet(of)} for name, entry in acted.items()},
+        "actuators": {name: entry if of.cooled else entry | {"capacity": data_sheet(of)}
+                      for name, entry in acted.items()},
         "energy": {"electricity": power},
     }  # fmt: skip

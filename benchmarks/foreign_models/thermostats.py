@@ -11,11 +11,17 @@ from foreign_models import objects as ep
 
 #: Heating setpoints by day and by night of EnergyPlus' reference buildings [degC].
 WARM, COOL = 21.0, 15.6
-COOLING = 26.0  # degC, always
+#: Cooling setpoints of buildings that are looked at in winter: 26 degC, always.
+COOLING = [26.0] * 24
+#: Cooling setpoints by day and by night of buildings that are looked at in summer [degC].
+_COOLED, _LET_GO = 24.0, 30.0
 
 
-def thermostat(zone: str, weekday: Sequence[float], weekend: Sequence[float], *, cooled: bool = False) -> Objects:
-    """Return a thermostat, whose heating setpoint is the schedule ``ZONE SETPOINT``.
+def thermostat(
+    zone: str, weekday: Sequence[float], weekend: Sequence[float],
+    cooling: tuple[Sequence[float], Sequence[float]] | None = None,
+) -> Objects:  # fmt: skip
+    """Return a thermostat, whose heating setpoint is the schedule ``ZONE SETPOINT``, that of cooling ``ZONE COOLING``.
 
     Parameters
     ----------
@@ -23,20 +29,19 @@ def thermostat(zone: str, weekday: Sequence[float], weekend: Sequence[float], *,
         Its zone.
     weekday, weekend : sequence of float
         Heating setpoint by hour [degC].
-    cooled : bool
-        Whether there is cooling.
+    cooling : tuple of sequence of float, optional
+        Cooling setpoint by hour of working days and of week-ends, where there is cooling [degC].
     """
     kind, heating = "SingleHeating", f"{zone} SETPOINT"
-    setpoints = {"setpoint_temperature_schedule_name": heating}
-    if cooled:
+    setpoints, schedules = {"setpoint_temperature_schedule_name": heating}, {heating: ep.daily(weekday, weekend)}
+    if cooling is not None:
         kind = "DualSetpoint"
         setpoints = {"heating_setpoint_temperature_schedule_name": heating,
-                     "cooling_setpoint_temperature_schedule_name": f"{zone} cooling"}  # fmt: skip
+                     "cooling_setpoint_temperature_schedule_name": f"{zone} COOLING"}  # fmt: skip
+        schedules[f"{zone} COOLING"] = ep.daily(*cooling)
     return {
-        "Schedule:Compact": {heating: ep.daily(weekday, weekend)},
-        "Schedule:Constant": {
-            f"{zone} cooling": ep.constant(COOLING), f"{zone} kind": ep.constant(4.0 if cooled else 1.0),
-        },
+        "Schedule:Compact": schedules,
+        "Schedule:Constant": {f"{zone} kind": ep.constant(1.0 if cooling is None else 4.0)},
         f"ThermostatSetpoint:{kind}": {f"{zone} setpoints": setpoints},
         "ZoneControl:Thermostat": {f"{zone} thermostat": {
             "zone_or_zonelist_name": zone, "control_type_schedule_name": f"{zone} kind",
@@ -60,21 +65,37 @@ def clock(occupied: Sequence[bool], lead: int = 2, cool: float = COOL) -> list[f
     return [WARM if any(occupied[(hour + k) % 24] for k in range(lead + 1)) else cool for hour in range(24)]
 
 
-def thermostat_points(zone: str, entity: str) -> tuple[dict[str, str], dict[str, Any]]:
+def cooling_clock(occupied: Sequence[bool], lead: int = 2) -> list[float]:
+    """Return the cooling setpoints of a thermostat's own clock, shape (24,) [degC].
+
+    Parameters
+    ----------
+    occupied : sequence of bool
+        Whether somebody is in, by hour.
+    lead : int
+        So long before somebody comes it is cool already [h].
+    """
+    return [_COOLED if value == WARM else _LET_GO for value in clock(occupied, lead)]
+
+
+def thermostat_points(zone: str, entity: str, *, cooled: bool = False) -> tuple[dict[str, str], dict[str, Any]]:
     """Return measured points and actuators of a thermostat, as ``plant.yaml`` has them.
 
     Parameters
     ----------
     zone, entity : str
         EnergyPlus' name, and ours.
+    cooled : bool
+        Whether the setpoint of cooling is among them.
     """
-    setpoint = f"{entity}/zone_air_heating_temperature_setpoint"
-    measured = {
-        f"{entity}/zone_air_temperature_sensor": f"{zone}, Zone Mean Air Temperature",
-        setpoint: f"{zone} SETPOINT, Schedule Value",
-    }
-    signal = f"{zone} SETPOINT, Schedule:Compact, Schedule Value"
-    return measured, {setpoint: {"signal": signal, "range": ["12 degC", "25 degC"]}}
+    measured, acted = {f"{entity}/zone_air_temperature_sensor": f"{zone}, Zone Mean Air Temperature"}, {}
+    kinds = {"heating": (f"{zone} SETPOINT", ["12 degC", "25 degC"])}
+    kinds |= {"cooling": (f"{zone} COOLING", ["20 degC", "32 degC"])} if cooled else {}
+    for kind, (schedule, span) in kinds.items():
+        setpoint = f"{entity}/zone_air_{kind}_temperature_setpoint"
+        measured[setpoint] = f"{schedule}, Schedule Value"
+        acted[setpoint] = {"signal": f"{schedule}, Schedule:Compact, Schedule Value", "range": span}
+    return measured, acted
 
 
 def comfort(weekday: Sequence[bool], weekend: Sequence[bool], within: tuple[float, float] = (20.0, 24.0),

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from mpc.identify.machines import Machine
+from mpc.identify.machines import Machine, as_heated
 from mpc.loop.plant import Measurements
 from mpc.scenario.forecast import Forecast
 from thermal.case.points import ZONE_TEMPERATURE
@@ -38,7 +38,8 @@ class FullSpeed:
     """Runs machines at full speed from the lower edge of the comfort band to a difference above it, else not at all.
 
     The edge is the highest of the coming hours, so that zones are warm when people come; in between they are set back.
-    Setpoints are at that edge. A rule without any model, and hard to beat.
+    Setpoints are at that edge, those of cooling at the lowest upper one of these hours. A rule without any model, and
+    hard to beat.
 
     Parameters
     ----------
@@ -75,12 +76,16 @@ class FullSpeed:
         near = np.asarray((index - index[0]).total_seconds() < self.lead)
         for machine in self.machines:
             actuator = machine.actuator
-            edges = [forecast.table.loc[near, f"{zone}/comfort_lower_temperature"].max() for zone in machine.serves]
+            sides = ("lower", "upper") if machine.sign > 0.0 else ("upper", "lower")
+            names = [[f"{zone}/comfort_{side}_temperature" for zone in machine.serves] for side in sides]
+            bands = [as_heated(forecast.table[of], machine.sign) for of in names]
+            edges = bands[0][near].max().to_numpy()
             if machine.role == "setpoint":
-                chosen[machine.name] = float(np.clip(max(edges), actuator.lowest, actuator.highest))
+                told = float(edges.max()), float(bands[1].iloc[0].min())
+                chosen |= machine.told(*(as_heated(edge, machine.sign) for edge in told))
                 continue
             seen = [measurements[f"{zone}/{ZONE_TEMPERATURE}"] for zone in machine.serves]
-            above = float(np.nanmin(np.array(seen) - np.array(edges)))
+            above = float(np.nanmin(np.array(seen) - edges))
             if above < 0.0:
                 self._on[machine.name] = True
             elif above > self.difference:

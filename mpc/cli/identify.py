@@ -32,6 +32,9 @@ def identify(
     actuators: Annotated[
         str, options.value("What is controlled; default: commands of machines, else setpoints of zones.", "NAME,...")
     ] = "",
+    cooling: Annotated[
+        bool, options.switch("--cooling", "Control setpoints of cooling; those of heating are left to the plant.")
+    ] = False,
     at: Annotated[str | None, options.value("Unit or server in the place of the description's.", "FILE|URL")] = None,
     seed: Annotated[int, options.value("Seed of the excitation.")] = 0,
     workers: many.Workers = None,
@@ -51,18 +54,19 @@ def identify(
     from mpc.identify.identify import identify as identify_plant
     from mpc.identify.telemetry import read_telemetry
     from mpc.reports.identify import identify_rows, identify_summary, identify_verdict, map_rows, write_identified
-    from mpc.studies.described import PlantStudy, experiment_period, run_experiment
+    from mpc.studies.described import PlantStudy
+    from mpc.studies.excited import experiment_period, run_experiment
 
     wanted = tuple(options.ids(actuators))
     if telemetry is None and at is None:
-        settings = {"days": days, "start": start, "actuators": wanted, "seed": seed}
+        settings = {"days": days, "start": start, "actuators": wanted, "cooling": cooling, "seed": seed}
         how = many.How(workers, scheduler, retries, limit, force, json)
         if (code := many.of_folder("identify", plant, out, settings, how)) is not None:
             return code
     check_results_folder(out, force)
     path = Path(plant)
     begin, end = (None, None) if telemetry is not None else experiment_period(path, at, days, start)
-    study = PlantStudy(path, at, begin, end, actuators=wanted)
+    study = PlantStudy(path, at, begin, end, actuators=wanted, cooling=cooling)
     made = None
     with Waiting(f"identify {path.stem}") as progress:
         if telemetry is None:

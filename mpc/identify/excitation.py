@@ -23,8 +23,8 @@ class ExcitationSettings:
         Shortest and longest time that a level is held [s]: several minutes of a machine's start up, and times over
         which a floor answers.
     ahead : tuple of float
-        How long before it holds a lower and an upper edge count [s]: a heated floor warms in hours, and gives its heat
-        off over half a day.
+        How long before it holds a lower and an upper edge count, the other way round of cooling [s]: a heated floor
+        warms in hours, and gives its heat off over half a day.
     guard : tuple of float
         Distance from the lower and from the upper edge at which the plant gets a machine back that drives there [K];
         the upper one is larger, as a floor goes on to give heat.
@@ -49,8 +49,9 @@ class Excitation:
 
     A pseudo-random sequence (Ljung 1999, System Identification, ch. 13.3) of levels rather than of two values, as maps
     are to be told from it too: off, full load and, where the actuator takes them, loads in between; setpoints anywhere
-    within the band of their zone. Once a zone of a machine is nearer to an edge of its band than the guard, on the side
-    that the machine drives it to, the plant's own control has the machine.
+    within the band of their zone, those of cooling in its upper half where that of heating cannot be told. Once a zone
+    of a machine is nearer to an edge of its band than the guard, on the side that the machine drives it to, the plant's
+    own control has the machine.
 
     Parameters
     ----------
@@ -95,7 +96,11 @@ class Excitation:
                 continue
             if k >= self._until[machine.name]:
                 self._draw(machine, place, k)
-            chosen[machine.name] = self._value[machine.name]
+            value = self._value[machine.name]
+            if machine.role == "setpoint":
+                chosen |= machine.told(value, place[3] if machine.sign > 0.0 else place[2])
+            else:
+                chosen[machine.name] = value
         return chosen
 
     def _place(
@@ -104,14 +109,15 @@ class Excitation:
         """Coldest and warmest distance of the served zones from the lower and upper edges, and the edges [K]."""
         if forecast is None:
             return None
-        soon, later = (max(round(s / self.step_seconds), 1) for s in self.settings.ahead)
+        counts = tuple(max(round(s / self.step_seconds), 1) for s in self.settings.ahead)
+        for_low, for_high = counts if machine.sign > 0.0 else counts[::-1]
         found = []
         for zone in machine.serves:
             name = f"{zone}/{ZONE_TEMPERATURE}"
             if name not in measurements or not np.isfinite(measurements[name]):
                 return None
-            low = float(forecast.table[f"{zone}/comfort_lower_temperature"].iloc[:soon].max())
-            high = float(forecast.table[f"{zone}/comfort_upper_temperature"].iloc[:later].min())
+            low = float(forecast.table[f"{zone}/comfort_lower_temperature"].iloc[:for_low].max())
+            high = float(forecast.table[f"{zone}/comfort_upper_temperature"].iloc[:for_high].min())
             found.append((measurements[name] - low, high - measurements[name], low, high))
         below, above, lows, highs = zip(*found, strict=True)
         return min(below), min(above), max(lows), min(highs)
@@ -132,6 +138,8 @@ class Excitation:
         low, high = actuator.lowest, actuator.highest
         if machine.role == "setpoint":
             lower, upper = place[2] + self.settings.guard[0], place[3] - self.settings.guard[0]
+            if machine.sign < 0.0 and machine.beside is None:  # above the setpoint of heating, which the plant has
+                lower = 0.5 * (lower + upper)
             value = random.uniform(min(lower, upper), max(lower, upper))
             self._value[machine.name] = float(np.clip(value, low, high))
             return

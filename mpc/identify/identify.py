@@ -12,7 +12,7 @@ from calibration.grey_box.judge import LeadError, judge
 from calibration.grey_box.network import GreyBox
 from mpc.errors import PlantError
 from mpc.identify.curves import EMITTER
-from mpc.identify.machines import Machine
+from mpc.identify.machines import Machine, as_heated, pairs_as_heated
 from mpc.identify.maps import Loads, led_heat, map_machines
 from mpc.identify.model import PlantModel
 from mpc.identify.shared import out_of_reach, shared_of
@@ -90,7 +90,7 @@ def identify(telemetry: PlantTelemetry, machines: Sequence[Machine], progress: P
         errors = judge(begin, data, split)
     box = fit_grey_box(begin, data, progress)
     loads = _loads(telemetry, machines, data, box)
-    signals = data.heat
+    signals = np.column_stack([machine.signal(telemetry) for machine in machines])
     bought = {name: telemetry.column(name) for name in CARRIERS if name in telemetry.frame}
     own = [telemetry.column(m.power) if m.power and m.heat else None for m in machines]
     above = _above(telemetry, machines)
@@ -99,10 +99,12 @@ def identify(telemetry: PlantTelemetry, machines: Sequence[Machine], progress: P
     if source is not None:
         rest = [{kind: curve for kind, curve in m.powers.items() if kind not in source.powers} for m in maps]
         maps = tuple(replace(m, powers=powers) for m, powers in zip(maps, rest, strict=True))
-    alone, law = [found.limits for found in maps], np.array([found.above[1] for found in maps])
-    wanted = out_of_reach(above, law)
-    shared = shared_of(led_heat(maps), telemetry.step, loads.outdoor, loads.level, wanted, alone)
+    sign, law = machines[0].sign, np.array([found.above[1] for found in maps])
+    alone, wanted = [pairs_as_heated(found.limits, sign) for found in maps], out_of_reach(above, law)
+    outdoor = as_heated(loads.outdoor, sign)
+    held_back = shared_of(led_heat(maps), telemetry.step, outdoor, loads.level, wanted, alone)
     notes = _notes(telemetry, machines, suns)
+    shared = pairs_as_heated(held_back, sign)
     model = PlantModel(telemetry.site.name, telemetry.step, box, maps, base | left, shared, source)
     return Identified(model, telemetry, data, loads, tuple(errors), split, notes)
 
@@ -110,7 +112,7 @@ def identify(telemetry: PlantTelemetry, machines: Sequence[Machine], progress: P
 def _data(telemetry: PlantTelemetry, machines: Sequence[Machine]) -> GreyBoxData:
     """Collect the inputs of the grey box."""
     sun = np.column_stack([*telemetry.suns.values()]) if telemetry.suns else np.empty((len(telemetry.frame), 0))
-    heat = np.column_stack([machine.signal(telemetry) for machine in machines])
+    heat = np.column_stack([machine.sign * machine.signal(telemetry) for machine in machines])
     return GreyBoxData(telemetry.step, telemetry.zone, telemetry.outdoor, sun, heat, telemetry.gain)
 
 
@@ -125,7 +127,7 @@ def _loads(telemetry: PlantTelemetry, machines: Sequence[Machine], data: GreyBox
 
 
 def _above(telemetry: PlantTelemetry, machines: Sequence[Machine]) -> FloatArray:
-    """How far setpoints lie above the air of their zones at the ends of the steps, shape (n_time, n_machine) [K]."""
+    """How far setpoints lie above the air at the ends of the steps, below it of cooling, (n_time, n_machine) [K]."""
     columns = []
     for machine in machines:
         set_to = telemetry.frame.get(f"{SET}{machine.name}")
@@ -134,7 +136,7 @@ def _above(telemetry: PlantTelemetry, machines: Sequence[Machine]) -> FloatArray
         mean = telemetry.frame[f"{machine.serves[0]}/{ZONE_TEMPERATURE}"]
         zone = 0.5 * (mean + mean.shift(-1))
         if machine.role == "setpoint" and value is not None:
-            columns.append((value - zone).to_numpy(dtype=float))
+            columns.append(machine.sign * (value - zone).to_numpy(dtype=float))
         else:
             columns.append(np.full(len(zone), np.nan))
     return np.column_stack(columns)

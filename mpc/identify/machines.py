@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
+from calibration.estimation.state_space import REFERENCE
 from mpc.errors import PlantError
 from mpc.identify.telemetry import SET, PlantTelemetry
-from mpc.loop.actuators import HEATING_SETPOINT, Actuator
+from mpc.loop.actuators import COOLING_SETPOINT, HEATING_SETPOINT, Actuator
 from thermal._types import FloatArray
 from thermal.case.points import HEATING_POWER
 
@@ -24,8 +25,47 @@ _HELPERS = re.compile(r"(^|_)(fan|pump|valve|damper)(_|$)")
 #: Powers of a machine itself, in the order of choice where its heat is not measured.
 _POWERS = ("electrical_power_sensor", "gas_power_sensor")
 
+#: Kelvins between the setpoints of heating and cooling of a zone that are told together, so that neither works against
+#: the other: EnergyPlus stops where they cross, and thermostats of dead band control keep a kelvin or more.
+_APART = 1.0
+
 #: Share of the largest values that a full load is read from [-], robust against single steps.
 FULL = 0.98
+
+
+def as_heated(temperature: Any, sign: float) -> Any:
+    """Give a temperature as it is where machines heat; where they cool it is mirrored about 20 degC [K].
+
+    What is cold to a machine that heats is hot to one that cools: weather in which it is weakest, the edge of a band
+    that its zone is kept from, air that wants it. Mirrored, what holds of heating holds of cooling. Mirrored twice it
+    is itself again.
+
+    Parameters
+    ----------
+    temperature : number or array
+        [K].
+    sign : float
+        1 of machines that heat, -1 of machines that cool [-].
+
+    Examples
+    --------
+    >>> as_heated(280.15, 1.0), round(as_heated(306.15, -1.0), 2)
+    (280.15, 280.15)
+    """
+    return temperature if sign > 0.0 else 2.0 * REFERENCE - temperature
+
+
+def pairs_as_heated(pairs: Iterable[tuple[float, float]], sign: float) -> tuple[tuple[float, float], ...]:
+    """Give pairs of a temperature [K] and something else with the temperatures of `as_heated`, rising.
+
+    Parameters
+    ----------
+    pairs : iterable of tuple of float
+        Temperature first [K].
+    sign : float
+        As of `as_heated` [-].
+    """
+    return tuple(sorted((float(as_heated(temperature, sign)), value) for temperature, value in pairs))
 
 
 @dataclass(frozen=True)
@@ -41,11 +81,13 @@ class Machine:
     serves : tuple of str
         Zones that its heat may go to.
     heat : str
-        Column with its heat; empty where it is not measured.
+        Column with its heat, negative where it cools; empty where it is not measured.
     power : str
         Column with what it buys; empty for the plant's meters.
     capacity : tuple of tuple of float
         Of a setpoint whose machine has a data sheet: outdoor air [K], rising, and the most heat there [W].
+    beside : Actuator or None
+        Of a setpoint of heating that of cooling of the same zone, and the other way round, where there is one.
     """
 
     actuator: Actuator
@@ -54,24 +96,70 @@ class Machine:
     heat: str = ""
     power: str = ""
     capacity: tuple[tuple[float, float], ...] = ()
+    beside: Actuator | None = None
 
     @property
     def name(self) -> str:
         """Of the actuator."""
         return self.actuator.name
 
+    @property
+    def sign(self) -> float:
+        """Of the heat that it gives: -1 of the setpoints of cooling, else 1 [-]."""
+        return -1.0 if self.name.rpartition("/")[2] == COOLING_SETPOINT else 1.0
+
+    def told(self, value: float, other: float) -> dict[str, float]:
+        """Give what is told where a setpoint is: beside it the zone's other one, so that the two never cross.
+
+        That is at its own edge of the band, or a kelvin from the setpoint where that is farther from it.
+
+        Parameters
+        ----------
+        value : float
+            Setpoint [K].
+        other : float
+            The other edge of the band, the upper one of heating [K].
+
+        Examples
+        --------
+        >>> heating, cooling = (Actuator(f"room/zone_air_{k}_temperature_setpoint", "K", 285.0, 305.0)
+        ...                     for k in ("heating", "cooling"))
+        >>> [*Machine(cooling, "setpoint", ("room",), beside=heating).told(293.5, 293.15).values()]
+        [293.5, 292.5]
+        """
+        values = {self.name: float(np.clip(value, self.actuator.lowest, self.actuator.highest))}
+        if self.beside is not None:
+            apart = values[self.name] + self.sign * _APART
+            beside = max(other, apart) if self.sign > 0.0 else min(other, apart)
+            values[self.beside.name] = float(np.clip(beside, self.beside.lowest, self.beside.highest))
+        return values
+
     def signal(self, telemetry: PlantTelemetry) -> FloatArray:
-        """Heat, or what is bought in its place, shape (n_time,) [W].
+        """Heat that it gives, or takes where it cools, or what is bought in its place, shape (n_time,) [W].
 
         Parameters
         ----------
         telemetry : PlantTelemetry
             Of the plant.
         """
-        if self.heat or self.power:
-            return telemetry.column(self.heat or self.power)
+        if self.heat:
+            return self.sign * telemetry.column(self.heat)
+        if self.power:
+            return telemetry.column(self.power)
         bought = telemetry.bought
         return np.asarray(bought - np.quantile(bought, 1.0 - FULL))
+
+    def given(self, measurements: Mapping[str, float]) -> float:
+        """Heat that it gave in a step, or took where it cools, or what it bought in its place [W]; NaN while unknown.
+
+        Parameters
+        ----------
+        measurements : mapping of str to float
+            Of the step [W].
+        """
+        column = self.heat or self.power
+        value = measurements[column] if column in measurements else np.nan
+        return float(self.sign * value if self.heat else value)
 
     def level(self, telemetry: PlantTelemetry) -> FloatArray:
         """Load as a share of full load, shape (n_time,) [-]; NaN while nothing says it.
@@ -116,10 +204,13 @@ def find_machines(
     zones: Sequence[str],
     wanted: Sequence[str] = (),
     capacities: Mapping[str, tuple[tuple[float, float], ...]] | None = None,
+    *,
+    cooling: bool = False,
 ) -> tuple[Machine, ...]:
     """Choose the actuators that are controlled: commands of machines, else setpoints of zones.
 
-    Fans, pumps, valves and dampers are left to the plant where it has other machines: they follow these.
+    Fans, pumps, valves and dampers are left to the plant where it has other machines: they follow these. All of them
+    heat, or all cool; the other is left to the plant.
 
     Parameters
     ----------
@@ -133,32 +224,40 @@ def find_machines(
         Names of actuators in the place of that choice.
     capacities : mapping of str to tuple, optional
         By actuator, what a data sheet says: outdoor air [K] and heat [W], see `Machine`.
+    cooling : bool
+        Whether the setpoints of cooling are chosen.
 
     Raises
     ------
     PlantError
-        When there is none, a wanted one is not there, or a data sheet is of one that is no setpoint with measured heat.
+        When there is none, a wanted one is not there, some heat and others cool, or a data sheet is of one that is no
+        setpoint with measured heat.
     """
     sheets = {name: pairs for name, pairs in (capacities or {}).items() if pairs}
     by_name = {a.name: a for a in actuators}
     for name in wanted:
         PlantError.unless_known(name, by_name, "actuators", "one of the plant")
     points = {name: name.rpartition("/")[2] for name in by_name}
-    setpoints = [name for name in by_name if points[name] == HEATING_SETPOINT]
+    setpoints = {kind: [n for n in by_name if points[n] == kind] for kind in (HEATING_SETPOINT, COOLING_SETPOINT)}
     commands = [name for name, a in by_name.items() if a.unit == "1"]
     main = [name for name in commands if not _HELPERS.search(points[name])]
-    chosen = [*wanted] or main or commands or setpoints
-    expected = "a command of a machine, or a zone_air_heating_temperature_setpoint"
+    chosen, expected = [*wanted], f"a {COOLING_SETPOINT}"
+    if not wanted:
+        chosen = setpoints[COOLING_SETPOINT] if cooling else main or commands or setpoints[HEATING_SETPOINT]
+    if not cooling:
+        expected = f"a command of a machine, or a {HEATING_SETPOINT}"
     PlantError.unless(chosen, "actuators", expected, ", ".join(by_name) or "none")
+    cools = [name for name in chosen if name in setpoints[COOLING_SETPOINT]]
+    PlantError.unless(len(cools) in (0, len(chosen)), "actuators", "machines that all heat, or all cool", chosen)
     heats = [c for c in columns if c.rpartition("/")[2] == HEATING_POWER]
     made = []
     for name in chosen:
         entity = name.rpartition("/")[0]
-        role: Role = "setpoint" if name in setpoints else "machine"
+        role: Role = "setpoint" if any(name in kind for kind in setpoints.values()) else "machine"
         own = [c for c in heats if c.rpartition("/")[0] == entity]
         heat = own[0] if own else heats[0] if len(heats) == len(chosen) == 1 else ""
-        beside = (entity, heat.rpartition("/")[0])
-        power = next((f"{e}/{p}" for e in beside if e for p in _POWERS if f"{e}/{p}" in columns), "")
+        entities = (entity, heat.rpartition("/")[0])
+        power = next((f"{e}/{p}" for e in entities if e for p in _POWERS if f"{e}/{p}" in columns), "")
         PlantError.unless(
             heat or power or len(chosen) == 1, f"actuator {name}", f"a sensor {entity}/{HEATING_POWER} or {_POWERS[0]}",
             "none", "add it to `measurements`, so that machines can be told apart",
@@ -167,7 +266,9 @@ def find_machines(
             name not in sheets or (role == "setpoint" and heat), f"actuators.{name}.capacity",
             "a setpoint whose heat is measured", "a command" if role == "machine" else "no heat",
         )  # fmt: skip
-        made.append(Machine(by_name[name], role, _served(entity, zones), heat, power, sheets.get(name, ())))
+        kinds = [kind for kind in setpoints if kind != points[name]] if role == "setpoint" else []
+        beside = next((by_name[f"{entity}/{kind}"] for kind in kinds if f"{entity}/{kind}" in by_name), None)
+        made.append(Machine(by_name[name], role, _served(entity, zones), heat, power, sheets.get(name, ()), beside))
     return tuple(made)
 
 

@@ -12,7 +12,7 @@ from mpc.errors import PlantError
 from mpc.identify.corrections import PowerCorrection, Reading
 from mpc.identify.curves import EMITTER, OUTDOOR, Curve, features_of
 from mpc.identify.limits import limits_of
-from mpc.identify.machines import Machine
+from mpc.identify.machines import Machine, as_heated, pairs_as_heated
 from thermal._types import BoolArray, FloatArray
 
 #: How a machine is run: whole or not at all for parts of the time, at any part load, or by a zone's own controller.
@@ -74,7 +74,7 @@ class MachineMap:
     powers : mapping of str to Curve
         Of each kind that is bought [W].
     above : tuple of float
-        Of a setpoint: how far it lies above the zone's air at no load and at full load [K].
+        Of a setpoint: how far it lies above the zone's air at no load and at full load, below it where it cools [K].
     limits : tuple of tuple of float
         Of a setpoint: outdoor air [K] and load [-] of steps at which no more heat was to be had.
     own : OwnPower or None
@@ -331,7 +331,7 @@ def map_machines(
     bought : mapping of str to ndarray
         Power of each kind that the plant buys [W].
     above : ndarray, shape (n_time, n_machine)
-        How far setpoints lie above the air of their zones [K]; NaN of machines.
+        How far setpoints lie above the air of their zones, below it where they cool [K]; NaN of machines.
     own : sequence of ndarray or None
         What each machine's own sensor of power says, shape (n_time,) [W]; None of those without.
 
@@ -353,7 +353,8 @@ def map_machines(
             made.append(replace(found, operation=_operation(found)))
         else:
             level, over = loads.level[:, m], above[:, m]
-            made.append(replace(found, above=_local(level, over), limits=limits_of(loads.outdoor, level, over)))
+            limits = limits_of(as_heated(loads.outdoor, machine.sign), level, over)
+            made.append(replace(found, above=_local(level, over), limits=pairs_as_heated(limits, machine.sign)))
     made = [
         found if power is None else _with_own(found, m, loads, power)
         for m, (found, power) in enumerate(zip(made, own or [None] * len(made), strict=True))

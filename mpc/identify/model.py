@@ -24,7 +24,7 @@ from mpc.loop.actuators import Actuator
 from thermal._types import FloatArray
 
 #: File of a model in its folder, and the version of its contents.
-FILE, FORMAT = "model.json", 5
+FILE, FORMAT = "model.json", 6
 
 #: A load that is none [-].
 _NOTHING = 1e-9
@@ -62,6 +62,11 @@ class PlantModel:
     source: Source | None = None
 
     @property
+    def sign(self) -> float:
+        """Of the heat that its machines give: 1 where they heat, -1 where they cool [-]."""
+        return self.maps[0].machine.sign if self.maps else 1.0
+
+    @property
     def led_heat(self) -> FloatArray:
         """Full heat of machines that are led by a setpoint, 0 of others, shape (n_machine,) [W]."""
         return led_heat(self.maps)
@@ -73,6 +78,8 @@ class PlantModel:
 
     def heat(self, states: FloatArray, levels: FloatArray, outdoor: FloatArray | float) -> FloatArray:
         """Heat of each machine, or what stands for it where it is not measured, shape (..., n_machine) [W].
+
+        Negative where they cool.
 
         Parameters
         ----------
@@ -86,7 +93,7 @@ class PlantModel:
         emitter = self.box.emitter(states)
         heat = np.empty(emitter.shape)
         for k, found in enumerate(self.maps):
-            heat[..., k] = found.at(found.heat, levels[..., k], outdoor, emitter[..., k])
+            heat[..., k] = self.sign * found.at(found.heat, levels[..., k], outdoor, emitter[..., k])
         return heat
 
     def bought(self, states: FloatArray, levels: FloatArray, outdoor: FloatArray | float) -> FloatArray:
@@ -120,8 +127,7 @@ class PlantModel:
         """Values for a file."""
         maps = [
             {
-                "machine": {**{k: v for k, v in vars(m.machine).items() if k != "actuator"},
-                            "actuator": asdict(m.machine.actuator)},
+                "machine": asdict(m.machine),
                 "operation": m.operation, "heat": asdict(m.heat), "above": list(m.above),
                 "limits": [list(pair) for pair in m.limits],
                 "powers": {kind: asdict(curve) for kind, curve in m.powers.items()},
@@ -164,8 +170,9 @@ class PlantModel:
 def _map_of(entry: Mapping[str, Any]) -> MachineMap:
     told = entry["machine"]
     sheet = tuple((float(outdoor), float(heat)) for outdoor, heat in told["capacity"])
+    beside = None if told["beside"] is None else Actuator(**told["beside"])
     machine = Machine(
-        Actuator(**told["actuator"]), told["role"], tuple(told["serves"]), told["heat"], told["power"], sheet
+        Actuator(**told["actuator"]), told["role"], tuple(told["serves"]), told["heat"], told["power"], sheet, beside
     )
     powers = {kind: Curve(**curve) for kind, curve in entry["powers"].items()}
     limits = tuple((float(outdoor), float(load)) for outdoor, load in entry["limits"])

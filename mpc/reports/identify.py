@@ -17,7 +17,7 @@ from mpc.reports.display import write_results
 from mpc.reports.figures.identify import course_pictures, error_pictures, map_pictures
 from mpc.reports.means import Means
 from mpc.reports.page import clock, duration, listed, percent, render, significant, spell
-from mpc.studies.described import Experiment
+from mpc.studies.excited import Experiment
 
 #: What terms of a map are called.
 _TERMS = {

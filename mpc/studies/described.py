@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -12,7 +12,7 @@ import pandas as pd
 
 from mpc.adapters.boptest.scenario import PERIOD_DAYS
 from mpc.adapters.described.actuators import described_actuators
-from mpc.adapters.described.load import load_plant, period_of
+from mpc.adapters.described.load import load_plant
 from mpc.adapters.described.programs import SiteProgram
 from mpc.adapters.described.read import read_description
 from mpc.adapters.described.schema import PlantFile
@@ -20,12 +20,10 @@ from mpc.adapters.described.seen import seen_scenario
 from mpc.baselines.plants import FullSpeed
 from mpc.control.identified.controller import IdentifiedController, IdentifiedSettings
 from mpc.errors import ControlError, PlantError
-from mpc.identify.excitation import Excitation, ExcitationSettings
 from mpc.identify.machines import Machine, find_machines
 from mpc.identify.model import PlantModel
-from mpc.identify.telemetry import SET, PlantTelemetry, Site, run_recorded
+from mpc.identify.telemetry import SET, PlantTelemetry, Site
 from mpc.loop.actuators import Actuator
-from mpc.loop.run import ClosedLoopRun
 from mpc.scenario.scenario import Scenario
 from mpc.studies.electric import electric_of
 
@@ -51,6 +49,8 @@ class PlantStudy:
         Of optimal control.
     actuators : tuple of str
         What is controlled where there is no model; `find_machines` chooses by default.
+    cooling : bool
+        Whether it chooses setpoints of cooling.
     """
 
     path: Path
@@ -60,6 +60,7 @@ class PlantStudy:
     model: PlantModel | None = None
     settings: IdentifiedSettings = field(default_factory=IdentifiedSettings)
     actuators: tuple[str, ...] = ()
+    cooling: bool = False
 
     decided = "the machines' runs and loads"
 
@@ -151,7 +152,8 @@ class PlantStudy:
         """Find machines among actuators: a battery is none."""
         electric, told = electric_of(self.description), self.description.actuators
         of_machines = [a for a in actuators if electric is None or a.name != electric.command]
-        return find_machines(of_machines, columns, zones, self.actuators, {n: told[n].capacity for n in told})
+        sheets = {name: told[name].capacity for name in told}
+        return find_machines(of_machines, columns, zones, self.actuators, sheets, cooling=self.cooling)
 
     def seen_machines(self, seen: PlantTelemetry) -> tuple[Machine, ...]:
         """Actuators that are controlled, where there is telemetry: a real building has no program to ask.
@@ -280,10 +282,10 @@ class SeenStudy:
         found = [f"a start of a machine counts {given.start_price:g} {self.scenario.currency} for optimal control, and "
                  f"it makes {given.starts} in 24 hours at most"]  # fmt: skip
         if given.guarantee is not None:
-            asked = given.guarantee
+            asked, side = given.guarantee, "below" if self.study.model.sign > 0.0 else "above"
             found.append(
-                f"{asked.share:.3g} of the occupied steps may lie below the band: the distance that is kept from it is "
-                f"adapted within {asked.lowest:g} to {asked.highest:g} K"
+                f"{asked.share:.3g} of the occupied steps may lie {side} the band: the distance that is kept from it "
+                f"is adapted within {asked.lowest:g} to {asked.highest:g} K"
             )
         return tuple(found)
 
@@ -309,92 +311,3 @@ class RecordedPlant:
     def telemetry(self) -> pd.DataFrame:
         """Telemetry with what was set, forecast and bought [library's units]."""
         return self.seen.frame
-
-
-@dataclass(frozen=True)
-class Experiment:
-    """An excitation of a plant, and what it took.
-
-    Parameters
-    ----------
-    telemetry : PlantTelemetry
-        What was seen.
-    run : ClosedLoopRun
-        The loop.
-    scenario : Scenario
-        Prices and bands.
-    machines : tuple of Machine
-        What was set.
-    handed_back : float
-        Share of the steps of machines that the plant had back [-].
-    """
-
-    telemetry: PlantTelemetry
-    run: ClosedLoopRun
-    scenario: Scenario
-    machines: tuple[Machine, ...]
-    handed_back: float = field(default=0.0)
-
-
-def run_experiment(
-    study: PlantStudy, days: int, settings: ExcitationSettings, progress: Callable[[str, int, int], None] | None = None
-) -> Experiment:
-    """Excite a plant.
-
-    Parameters
-    ----------
-    study : PlantStudy
-        Its plant, from its start on; see `experiment_period` for that.
-    days : int
-        Length [d].
-    settings : ExcitationSettings
-        Choices.
-    progress : callable, optional
-        Called with stage, done, total.
-    """
-    with study.plant() as plant:
-        study.steps(plant)  # refuses a plant without forecasts before it runs
-        machines = study.machines(plant)
-        excitation = Excitation(machines, plant.control_step, settings)
-        steps = round(days * 86_400.0 / plant.control_step)
-        report = None if progress is None else (lambda done, _: progress("experiment", done, steps))
-        run, telemetry = run_recorded(plant, excitation, study.site, steps, report)
-        scenario = study.scenario(plant, telemetry)
-    return Experiment(telemetry, run, scenario, machines, excitation.handed_back / (steps * len(machines)))
-
-
-def experiment_period(path: Path, at: str | None, days: int, start: str | None = None) -> tuple[str, str]:
-    """Days for an experiment: those before the description's period, or after it where the year has too few before.
-
-    Parameters
-    ----------
-    path : Path
-        The description.
-    at : str or None
-        Unit or server in the place of its own.
-    days : int
-        Length [d].
-    start : str, optional
-        When it begins, in the place of that.
-
-    Returns
-    -------
-    tuple of str
-        Start and end, local.
-
-    Raises
-    ------
-    PlantError
-        When the start is no time.
-    """
-    if start is not None:
-        try:
-            return start, str(pd.Timestamp(start) + pd.Timedelta(days=days))
-        except ValueError as error:
-            raise PlantError("--start", "a local time such as 2023-01-09 00:00", repr(start)) from error
-    own, length = period_of(path, read_description(path, at=at))
-    begin = own - pd.Timedelta(days=days)
-    if begin.year < own.year or begin.day_of_year < 2:
-        begin = own + pd.Timedelta(days=length)
-    first, last = (f"{time.tz_localize(None):%Y-%m-%d %H:%M}" for time in (begin, begin + pd.Timedelta(days=days)))
-    return first, last

@@ -24,7 +24,8 @@ from mpc.reports.identify import identified_files
 from mpc.scenario.forecast import DAY_AHEAD_ERRORS
 from mpc.scenario.from_text import read_comfort, read_tariff
 from mpc.scenario.weather_files import read_epw, weather_of_case
-from mpc.studies.described import Experiment, PlantStudy, experiment_period, run_experiment
+from mpc.studies.described import PlantStudy
+from mpc.studies.excited import Experiment, experiment_period, run_experiment
 from mpc.studies.run import compare_controllers
 from mpc.studies.study import Study, StudySettings, make_study
 from thermal.case.case import Case
@@ -34,7 +35,7 @@ from thermal.errors import nearest
 PLANT = "plant.yaml"
 
 #: Settings of the two jobs, with their defaults.
-IDENTIFICATION: dict[str, Any] = {"days": 14, "start": None, "actuators": (), "seed": 0}
+IDENTIFICATION: dict[str, Any] = {"days": 14, "start": None, "actuators": (), "cooling": False, "seed": 0}
 COMPARISON: dict[str, Any] = {
     "controllers": (), "start": None, "end": None, "parameters": None, "controller_parameters": None, "dx": None,
     "plant": "reduced", "comfort_price": None, "weather": None, "tariff": None, "gas_price": None, "currency": None,
@@ -111,7 +112,7 @@ def _identified(path: Path, settings: Settings) -> Done:
     """Excite a described plant, and identify it."""
     given = {**IDENTIFICATION, **(settings if isinstance(settings, Mapping) else {})}
     begin, end = experiment_period(path, None, given["days"], given["start"])
-    study = PlantStudy(path, None, begin, end, actuators=tuple(given["actuators"]))
+    study = PlantStudy(path, None, begin, end, actuators=tuple(given["actuators"]), cooling=given["cooling"])
     made = run_experiment(study, given["days"], ExcitationSettings(seed=given["seed"]))
     found = identify_plant(made.telemetry, made.machines)
     result: tuple[Identified, Experiment] = (found, made)

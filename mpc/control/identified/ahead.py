@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mpc.control.identified.beyond import WEIGHTS
+from mpc.identify.machines import as_heated
 from mpc.identify.model import PlantModel
 from mpc.identify.telemetry import CARRIERS, facade_sun
 from mpc.scenario.forecast import Forecast
@@ -50,6 +51,22 @@ class Ahead:
     occupied: np.ndarray
     beyond: FloatArray
     together: FloatArray
+
+    def edges(self, sign: float) -> tuple[FloatArray, FloatArray]:
+        """Give the edges that machines keep zones from, and those beyond which they never drive them, as `as_heated`.
+
+        Parameters
+        ----------
+        sign : float
+            1 where machines heat, -1 where they cool [-].
+
+        Returns
+        -------
+        tuple of ndarray, shape (N, n_zone)
+            Lower edges and upper ones where they heat; upper and lower ones, mirrored, where they cool [K].
+        """
+        near, far = (self.lower, self.upper) if sign > 0.0 else (self.upper, self.lower)
+        return as_heated(near, sign), as_heated(far, sign)
 
     @classmethod
     def of(cls, model: PlantModel, forecast: Forecast, location: Location) -> Ahead:

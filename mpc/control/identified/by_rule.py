@@ -57,21 +57,22 @@ def _rule(
     first = 1 + len(model.box.suns)  # of the inputs: outdoor air, suns, heat of the machines, gains
     heated, others = drive[:, first : first + m], np.delete(drive, np.s_[first : first + m], axis=1)
     exogenous = np.column_stack([parameters[:, :1] - REFERENCE, parameters[:, 1 : first + len(zones)]]) @ others.T
-    near, shares = max(round(LEAD / model.step), 1), model.shares
+    near, shares, sign = max(round(LEAD / model.step), 1), model.shares, model.sign
+    kept = ahead.edges(sign)[0] - REFERENCE  # mirrored where machines cool, as are what they add and what is left
     state, most, runs = start[0], start[1], start[2].astype(bool).copy()
     states, levels = np.empty((count + 1, state.size)), np.zeros((count, len(served)))
     states[0] = state
     for n in range(count):
-        edges = ahead.lower[n : n + near].max(axis=0) - REFERENCE
+        edges = kept[n : n + near].max(axis=0)
         rest = transition @ state + exogenous[n]
         emitter = model.box.emitter(state)
         for k, (found, mine) in enumerate(zip(model.maps, served, strict=True)):
             edge = float(edges[mine].max())
             if found.operation == "setpoint":
-                gained = heated[:, k] * problem.heat(k, 1.0, ahead.outdoor[n], emitter[k])
+                gained = sign * heated[:, k] * problem.heat(k, 1.0, ahead.outdoor[n], emitter[k])
                 idle, wide = found.above[0], found.above[1] - found.above[0]
                 rise = float(gained[: len(zones)][mine].mean()) + wide
-                missing = edge - idle - float(rest[: len(zones)][mine].mean())
+                missing = edge - idle - sign * float(rest[: len(zones)][mine].mean())
                 levels[n, k] = np.clip(missing / rise, 0.0, most[n, k]) if rise > 0.0 else 0.0
                 continue
             above = float(state[: len(zones)][mine].min()) - edge

@@ -27,6 +27,7 @@ from mpc.control.rule_estimate import RuleEstimate
 from mpc.control.solvers.solution import Status
 from mpc.control.solvers.stages import StageData, StageMethod, StageSolution, StageSolver
 from mpc.errors import ControlError
+from mpc.identify.machines import as_heated
 from mpc.identify.maps import MachineMap
 from mpc.identify.model import PlantModel
 from mpc.loop.actuators import Actuator, need_actuator
@@ -65,7 +66,8 @@ class IdentifiedSettings:
         Of a zone's kelvin outside of its band for an hour [currency/K/h]: some hundred times what a kelvin less saves
         a house in an hour, so that bands are left only where they cannot be kept.
     back_off : float
-        Distance that is kept from the lower edges of the bands [K]; where a guarantee is asked for, that of its start.
+        Distance that is kept from the lower edges of the bands, the upper ones where machines cool [K]; where a
+        guarantee is asked for, that of its start.
     start_price : float
         Of a start of a machine [currency]: a compressor of 5,000 that bears 100,000 starts.
     starts : int
@@ -162,10 +164,11 @@ class IdentifiedController:
         self.back_offs: list[float] = []
 
     def _back_off(self, ahead: Ahead) -> FloatArray:
-        """Distance that is kept from the lower edges, shape (N, n_zone) [K]."""
+        """Distance that is kept from the edges that machines keep zones from, shape (N, n_zone) [K]."""
         if self.conformal is None:
             return np.full(ahead.lower.shape, self.settings.back_off)
-        return self.conformal.along(risen(ahead.lower, self.model.step, self._edges), ahead.occupied)
+        kept = ahead.edges(self.model.sign)[0]
+        return self.conformal.along(risen(kept, self.model.step, self._edges), ahead.occupied)
 
     def step(self, measurements: Measurements, forecast: Forecast | None) -> PlannedAction:
         """Choose values of the actuators.
@@ -230,20 +233,20 @@ class IdentifiedController:
         self._thermostats.learn(measurements, self._observer.zones(measurements), outdoor)
         self._learner.learn(measurements, levels, outdoor, self._observer.state)
         self._observer.update(measurements, before, levels)
+        kept = before.edges(self.model.sign)[0][:1]
         if self.conformal is not None:
-            realised = self._inside(self._observer.zones(measurements) - REFERENCE, before)
-            self.conformal.update(
-                realised, before.occupied[0], risen(before.lower[:1], self.model.step, self._edges)[0]
-            )
+            realised = self._inside(measurements, before)
+            self.conformal.update(realised, before.occupied[0], risen(kept, self.model.step, self._edges)[0])
         count = max(round(AFTER / self.model.step), 1)
-        self._edges = np.vstack([self._edges, before.lower[:1]])[-count:]
+        self._edges = np.vstack([self._edges, kept])[-count:]
 
-    def _inside(self, zone: FloatArray, ahead: Ahead) -> FloatArray:
-        """Distance from the lower edge of the band of the first step, positive inside, shape (n_zone,) [K].
+    def _inside(self, measurements: Measurements, ahead: Ahead) -> FloatArray:
+        """Distance of zones from the edge of the first step's band, positive inside, shape (n_zone,) [K].
 
-        What machines that heat can do about: not from the upper one.
+        From the edge that machines can do something about: the lower one where they heat.
         """
-        return np.asarray(zone[: len(self.model.box.zones)] - (ahead.lower[0] - REFERENCE))
+        zone = as_heated(self._observer.zones(measurements), self.model.sign)
+        return np.asarray(zone - ahead.edges(self.model.sign)[0][0])
 
     def _decided(self, ahead: Ahead) -> StageSolution | None:
         """Plan, with the first steps of machines in duty whole."""
@@ -341,8 +344,8 @@ class IdentifiedController:
         return replace(found, decisions=chosen)
 
     def _by_rule(self, measurements: Measurements, ahead: Ahead) -> FloatArray:
-        """Levels without a plan: full where a zone is too cold, else none."""
-        inside = self._inside(self._observer.zones(measurements) - REFERENCE, ahead)
+        """Levels without a plan: full where a zone is too cold, or too warm where machines cool, else none."""
+        inside = self._inside(measurements, ahead)
         return np.array([float((inside < self._kept[0])[mine].any()) for mine in self.model.box.serves])
 
     def _values(self, levels: FloatArray, solution: StageSolution | None, ahead: Ahead) -> dict[str, float]:
@@ -354,18 +357,18 @@ class IdentifiedController:
         for k, found in enumerate(self.model.maps):
             level = float(levels[k])
             if found.operation == "setpoint":
-                actuator = self._actuators[found.machine.name]
-                told = self._thermostats.tell(k, level, most[k], zone, self._edges_of(k, ahead), shared)
-                value = float(np.clip(told, actuator.lowest, actuator.highest))
+                edges = self._edges_of(k, ahead)
+                values |= found.machine.told(self._thermostats.tell(k, level, most[k], zone, edges, shared), edges[1])
             else:
-                value = self._command(found, level)
-            values[found.machine.name] = value
+                values[found.machine.name] = self._command(found, level)
         return values
 
     def _edges_of(self, k: int, ahead: Ahead) -> tuple[float, float]:
-        """Edges of the band of the zones of a machine, the lower one with what is kept from it [K]."""
-        served = self.model.box.serves[k]
-        return float((ahead.lower[0] + self._kept[0])[served].max()), float(ahead.upper[:2, served].min())
+        """Edges of a machine's zones: that which it keeps them from, with the distance, and the other [K]."""
+        served, sign = self.model.box.serves[k], self.model.sign
+        near, far = ahead.edges(sign)
+        kept, other = float((near[0] + self._kept[0])[served].max()), float(far[:2, served].min())
+        return as_heated(kept, sign), as_heated(other, sign)
 
     def _command(self, found: MachineMap, level: float) -> float:
         """Value of a machine's actuator for a level."""

@@ -16,6 +16,7 @@ from mpc.control.identified.beyond import WEIGHTS, beyond, carrier_of
 from mpc.control.identified.electric import Electric, ElectricNow, ElectricStage
 from mpc.control.solvers.stages import StageData, StageProblem
 from mpc.identify.curves import EMITTER, OUTDOOR
+from mpc.identify.machines import as_heated
 from mpc.identify.model import PlantModel
 from mpc.identify.telemetry import CARRIERS
 from mpc.scenario.rates import HOUR, KILOWATT_HOUR
@@ -61,13 +62,12 @@ class IdentifiedProblem:
         if self.electric is None:
             return None
         model, most = self.model, self.model.base.get(CARRIERS[0], 0.0)
+        weather = as_heated(OUTDOOR + np.array([-30.0, 10.0]), model.sign)
         for found in model.maps:
-            if CARRIERS[0] in found.powers:  # in the cold or in the mild, whatever its map says
-                most += max(
-                    float(found.at(found.powers[CARRIERS[0]], 1.0, OUTDOOR + d, EMITTER)) for d in (-30.0, 10.0)
-                )
+            if CARRIERS[0] in found.powers:  # in hard weather or in mild, whatever its map says
+                most += max(float(found.at(found.powers[CARRIERS[0]], 1.0, outdoor, EMITTER)) for outdoor in weather)
         if model.source is not None:
-            weather, nothing = OUTDOOR + np.array([-30.0, 10.0]), np.zeros(2)
+            nothing = np.zeros(2)
             most += float(
                 model.source.lines(weather, nothing + np.inf, nothing)[1][:, 0].max()
             )  # it counts by tangents
@@ -98,7 +98,7 @@ class IdentifiedProblem:
         return space.transition, space.drive
 
     def heat(self, k: int, load: Any, outdoor: Any, emitter: Any) -> Any:
-        """Heat of a machine that arrives, with numbers, arrays or symbols [W].
+        """Heat of a machine that arrives, with numbers, arrays or symbols, negative where it cools [W].
 
         Parameters
         ----------
@@ -111,7 +111,7 @@ class IdentifiedProblem:
         """
         found = self.model.maps[k]
         slope = 1.0 + float(self.model.box.slopes[k]) * (outdoor - COP_AT) / COP_PER
-        return found.at(found.heat, load, outdoor, emitter) * slope
+        return self.model.sign * found.at(found.heat, load, outdoor, emitter) * slope
 
     @cached_property
     def stage(self) -> StageProblem:
@@ -177,7 +177,7 @@ class IdentifiedProblem:
         ahead : Ahead
             Of the horizon.
         back_off : ndarray, shape (N, n_zone)
-            By which lower edges are raised, or lowered where it is negative [K].
+            By which the edges that machines keep zones from are moved into the bands, or out where it is negative [K].
         comfort_price : float
             Of a zone's kelvin outside of its band for an hour [currency/K/h].
         ends : tuple of ndarray, shape (N, n_machine)
@@ -197,18 +197,19 @@ class IdentifiedProblem:
         if self.model.source is not None:
             parameters = np.column_stack([parameters, *self.model.source.lines(ahead.outdoor, together, planned)])
         # an edge lies in the bands of the step before and of the step after it; nothing can be done about the first
-        wanted = np.minimum(ahead.lower + back_off, ahead.upper - _NARROWEST) - REFERENCE
-        lower = np.vstack([wanted[:1], np.maximum(wanted[:-1], wanted[1:]), wanted[-1:]])
-        upper = (
-            np.vstack([ahead.upper[:1], np.minimum(ahead.upper[:-1], ahead.upper[1:]), ahead.upper[-1:]]) - REFERENCE
-        )
+        near, far = ahead.edges(self.model.sign)
+        near = np.minimum(near + back_off, far - _NARROWEST)
+        near = np.vstack([near[:1], np.maximum(near[:-1], near[1:]), near[-1:]])
+        far = np.vstack([far[:1], np.minimum(far[:-1], far[1:]), far[-1:]])
+        ends_of = as_heated(np.minimum(near, far), self.model.sign), as_heated(far, self.model.sign)
+        lower, upper = (edge - REFERENCE for edge in (ends_of if self.model.sign > 0.0 else ends_of[::-1]))
         price = np.full((count + 1, zones), SCALE * comfort_price * step / HOUR)
-        lower, start = np.minimum(lower, upper), state[:nodes]
+        start = state[:nodes]
         if self._added is not None:
             now = now or ElectricNow(np.zeros(count))
-            ends_of = self._added.bands(count)
-            lower, upper = np.hstack([lower, ends_of[0]]), np.hstack([upper, ends_of[1]])
-            price = np.hstack([price, SCALE * ends_of[2]])
+            stored = self._added.bands(count)
+            lower, upper = np.hstack([lower, stored[0]]), np.hstack([upper, stored[1]])
+            price = np.hstack([price, SCALE * stored[2]])
             start = np.concatenate([start, self._added.start(now)])
             parameters = np.column_stack([parameters, now.generation / 1e3])
         return StageData(start, parameters, lower, upper, price)

@@ -7,6 +7,7 @@ import numpy as np
 from calibration.estimation.state_space import REFERENCE
 from mpc.control.identified.forecast_error import ForecastError
 from mpc.identify.limits import OUT_OF_REACH, HeatLimit
+from mpc.identify.machines import as_heated, pairs_as_heated
 from mpc.identify.model import PlantModel
 from mpc.identify.shared import SharedLimit, out_of_reach
 from mpc.loop.plant import Measurements
@@ -30,6 +31,8 @@ class Thermostats:
     Their feedback is quicker than the control step, so that they take up what the model has wrong: the value is the
     planned temperature, rather than one that is thought to cause the planned heat.
 
+    What is known of heating holds of cooling in temperatures that are mirrored (`as_heated`).
+
     Parameters
     ----------
     model : PlantModel
@@ -37,9 +40,10 @@ class Thermostats:
     """
 
     def __init__(self, model: PlantModel) -> None:
-        self._model = model
-        self._limits = [HeatLimit(found.limits, found.sheet) for found in model.maps]
-        self._shared = SharedLimit(model.led_heat, model.step, model.shared)
+        self._model, self._sign = model, model.sign
+        told = [[pairs_as_heated(pairs, self._sign) for pairs in (found.limits, found.sheet)] for found in model.maps]
+        self._limits = [HeatLimit(limits, sheet) for limits, sheet in told]
+        self._shared = SharedLimit(model.led_heat, model.step, pairs_as_heated(model.shared, self._sign))
         self._is_led = np.array([found.operation == "setpoint" for found in model.maps], dtype=bool)
         self._error = ForecastError(model.step)
         self._told, self._zone = np.full(len(model.maps), np.nan), np.full(len(model.box.zones), np.nan)
@@ -53,10 +57,10 @@ class Thermostats:
         outdoor : ndarray, shape (N,)
             Outdoor air that is forecast for the coming steps [K].
         """
-        error = self._error.ahead(len(outdoor))
+        error, weather = self._error.ahead(len(outdoor)), as_heated(outdoor, self._sign)
         return np.column_stack(
             [
-                limit.at(outdoor, error) if led else np.ones(len(outdoor))
+                limit.at(weather, error) if led else np.ones(len(outdoor))
                 for limit, led in zip(self._limits, self._is_led, strict=True)
             ]
         )
@@ -72,7 +76,7 @@ class Thermostats:
             Outdoor air that is forecast for the coming steps [K].
         """
         kept = np.where(np.arange(len(outdoor)) > 0, 1.0 - _RESERVE, 1.0)
-        return np.asarray(kept * self._shared.at(outdoor))
+        return np.asarray(kept * self._shared.at(as_heated(outdoor, self._sign)))
 
     def expect(self, outdoor: FloatArray) -> None:
         """Take a forecast, so that its error is known when its steps have come.
@@ -97,22 +101,22 @@ class Thermostats:
             Outdoor air over the step [K].
         """
         self._error.came(outdoor)
-        end = zone + 0.5 * np.nan_to_num(np.maximum(zone - self._zone, 0.0))
-        self._zone = zone
+        weather, air = as_heated(outdoor, self._sign), as_heated(zone, self._sign)
+        end = air + 0.5 * np.nan_to_num(np.maximum(air - self._zone, 0.0))
+        self._zone = air
         count = len(self._model.maps)
         loads, missing = np.full(count, np.nan), np.full(count, -np.inf)
         for k in np.flatnonzero(self._is_led & np.isfinite(self._told)):
             found = self._model.maps[k]
-            column = found.machine.heat or found.machine.power
-            if column in measurements and np.isfinite(measurements[column]):
-                loads[k] = measurements[column] / float(found.at(found.heat, 1.0, outdoor, REFERENCE))
+            if np.isfinite(found.machine.given(measurements)):
+                loads[k] = found.machine.given(measurements) / float(found.at(found.heat, 1.0, outdoor, REFERENCE))
                 missing[k] = self._told[k] - float(np.nanmean(end[self._served[k]]))
         full = np.array([found.above[1] for found in self._model.maps])
-        alone = self._shared.learn(outdoor, loads, (loads > _IDLE) & out_of_reach(missing, full), self._limits)
+        alone = self._shared.learn(weather, loads, (loads > _IDLE) & out_of_reach(missing, full), self._limits)
         for k in np.flatnonzero(loads > _IDLE):
             # what several at their limit give at once says nothing of one of them alone
-            if (alone[k] and missing[k] > OUT_OF_REACH) or loads[k] > self._limits[k].at(np.array([outdoor]))[0]:
-                self._limits[k].learn(outdoor, float(loads[k]))
+            if (alone[k] and missing[k] > OUT_OF_REACH) or loads[k] > self._limits[k].at(np.array([weather]))[0]:
+                self._limits[k].learn(weather, float(loads[k]))
 
     def shares_all(self, levels: FloatArray, outdoor: FloatArray) -> bool:
         """Tell whether a step's loads take all that is relied on of a shared source.
@@ -124,7 +128,7 @@ class Thermostats:
         outdoor : ndarray, shape (1,)
             Outdoor air [K].
         """
-        return bool(self._shared.shares @ levels > self._shared.at(outdoor)[0] - _IDLE)
+        return bool(self._shared.shares @ levels > self._shared.at(as_heated(outdoor, self._sign))[0] - _IDLE)
 
     def tell(
         self, k: int, level: float, most: float, zone: FloatArray, edges: tuple[float, float], shared: bool = False
@@ -144,12 +148,14 @@ class Thermostats:
         zone : ndarray, shape (n, n_zone)
             Planned air at the ends of the coming steps [K].
         edges : tuple of float
-            Temperatures that the zone shall not fall below, and that it is never told to rise above [K].
+            Temperatures that the zone shall not fall below, and that it is never told to rise above; where machines
+            cool, that it shall not rise above, and is never told to fall below [K].
         shared : bool
             Whether the plan takes all of a shared source, see `shares_all`.
         """
         idle, full = self._model.maps[k].above
-        air = zone[:, self._served[k]].mean(axis=1)
+        air = as_heated(zone[:, self._served[k]].mean(axis=1), self._sign)
+        near, far = (as_heated(edge, self._sign) for edge in edges)
         value = float(air[0]) + idle + min(level, 1.0) * (full - idle)
         if level > most - _IDLE:
             value = max(value + _PUSH, float(air.max()))
@@ -157,5 +163,5 @@ class Thermostats:
             value += _PUSH
         # a thermostat holds what it is told: within the edges it keeps the band where the model is wrong, or where the
         # plan leaves the band for hours that it fears not to keep
-        self._told[k] = edges[0] if level <= _IDLE else max(min(value, edges[1]), edges[0])
-        return float(self._told[k])
+        self._told[k] = near if level <= _IDLE else max(min(value, far), near)
+        return float(as_heated(self._told[k], self._sign))

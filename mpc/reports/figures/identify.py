@@ -67,7 +67,7 @@ def map_pictures(found: Identified) -> list[Picture]:
         u = _line_of(level, 1.0)
         power = sum((curve(1.0, u, outdoor, emitter) for curve in machine.powers.values()), 0.0 * u)
         efficiency = np.array([machine.efficiency(float(part), outdoor, emitter) for part in u])
-        seen = level, own, found.data.heat[:, m]
+        seen = level, own, found.model.sign * found.data.heat[:, m]
         drawn.append(_map_picture(machine.machine.name, found.loads.outdoor, seen, (u, power, efficiency)))
     return drawn
 
@@ -79,7 +79,7 @@ def _source_picture(found: Identified, source: Source, outdoor: float, bought: F
     u = _line_of(level, source.full)
     power = source.at(u, outdoor).sum(axis=-1)
     base = sum(watts for kind, watts in model.base.items() if kind in source.powers)
-    seen = level, bought - base, found.data.heat.sum(axis=1)
+    seen = level, bought - base, found.model.sign * found.data.heat.sum(axis=1)
     heat = u * float(model.led_heat.sum())
     return _map_picture("one source of all", found.loads.outdoor, seen, (u, power, heat / power))
 

@@ -17,7 +17,8 @@ from mpc.adapters.described.seen import seen_scenario
 from mpc.errors import PlantError
 from mpc.identify.excitation import ExcitationSettings
 from mpc.kpi.kpis import measure_kpis
-from mpc.studies.described import PlantStudy, run_experiment
+from mpc.studies.described import PlantStudy
+from mpc.studies.excited import run_experiment
 from mpc.studies.run import run_controller
 
 Make = Callable[..., Path]
