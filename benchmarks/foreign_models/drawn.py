@@ -1,8 +1,9 @@
-"""Twenty small buildings whose components are drawn at random: four of each thing that heats."""
+"""Twenty-eight small buildings whose components are drawn at random: four of each thing that heats or cools."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -12,7 +13,7 @@ from energyplus_trials.frame import Objects
 from foreign_models.flats import Flat, flats
 from foreign_models.flats import description as of_flats
 from foreign_models.foreign_plant import ForeignPlant
-from foreign_models.heat_pump import HeatPump
+from foreign_models.heat_pump import Chiller, HeatPump
 from foreign_models.house import House, house
 from foreign_models.house import description as of_house
 from foreign_models.objects import Fabric
@@ -34,13 +35,23 @@ PLACES = (
 )  # fmt: skip
 
 
+#: Places with summers.
+HOT = (
+    "USA_AZ_Phoenix-Sky.Harbor.Intl.AP.722780_TMY3", "USA_FL_Tampa.Intl.AP.722110_TMY3",
+    "USA_CA_Fresno.Air.Terminal.723890_TMY3", "USA_OK_Oklahoma.City-Will.Rogers.World.AP.723530_TMY3",
+    "USA_VA_Sterling-Washington.Dulles.Intl.AP.724030_TMY3",
+)  # fmt: skip
+
+
 def drawn_plants() -> dict[str, ForeignPlant]:
     """Draw the buildings by name; the same whatever is done with them."""
     found = {}
-    for number, draw in enumerate([_house, _flats, _shop] * EACH + [_office, _dwelling] * EACH):
+    cooled = [_cooled_shop, _cooled_office]
+    for number, draw in enumerate([_house, _flats, _shop] * EACH + [_office, _dwelling] * EACH + cooled * EACH):
         rng = np.random.default_rng([SEED, number])
         about, model, description = draw(rng)
-        found[f"drawn_{number + 1}"] = ForeignPlant(about, model, description, str(rng.choice(PLACES)))
+        place = str(rng.choice(HOT if draw in cooled else PLACES))
+        found[f"drawn_{number + 1}"] = ForeignPlant(about, model, description, place, draw in cooled)
     return found
 
 
@@ -76,6 +87,11 @@ def _house(rng: np.random.Generator) -> _Parts:
     return about, partial(house, of), partial(of_house, of)
 
 
+def _gain(fabric: Fabric, area: float, envelope: float, glass: float, height: float, inside: float) -> float:
+    """Heat that a building gains while it is 12 K warmer outdoors, with sun on a third of its glass [W]."""
+    return 12.0 / 35.0 * _loss(fabric, area, envelope, glass, height) + 600.0 * fabric.glass[1] * glass / 3.0 + inside
+
+
 def _flats(rng: np.random.Generator) -> _Parts:
     """Draw one to three flats with baseboards."""
     fabric, listed = _fabric(rng), {}
@@ -90,16 +106,31 @@ def _flats(rng: np.random.Generator) -> _Parts:
     return about, partial(flats, listed, fabric), partial(of_flats, listed)
 
 
-def _shop(rng: np.random.Generator) -> _Parts:
-    """Draw a shop with a unitary heat pump."""
+def _shop_of(rng: np.random.Generator) -> Shop:
+    """Draw a shop."""
     fabric, length, depth = _fabric(rng), float(rng.uniform(8.0, 20.0)), float(rng.uniform(8.0, 14.0))
     height, opens = float(rng.uniform(2.8, 4.0)), (int(rng.integers(6, 11)), int(rng.integers(17, 22)))
     glass = float(rng.uniform(0.2, 0.34)) * length * height
     need = _loss(fabric, length * depth, 2.0 * length * depth + 2.0 * length * height, glass, height)
     capacity, resistance = (round(need * float(rng.uniform(*of)), -2) for of in ((1.2, 2.0), (0.3, 0.8)))
-    of = Shop(fabric, length, depth, height, glass, float(rng.integers(2, 12)), float(rng.uniform(200.0, 900.0)),
-              capacity, resistance, opens)  # fmt: skip
-    about = f"Shop of {of.area:.0f} m2, unitary heat pump of {capacity / 1e3:.1f} kW"
+    return Shop(fabric, length, depth, height, glass, float(rng.integers(2, 12)), float(rng.uniform(200.0, 900.0)),
+                capacity, resistance, opens)  # fmt: skip
+
+
+def _shop(rng: np.random.Generator) -> _Parts:
+    """Draw a shop with a unitary heat pump."""
+    of = _shop_of(rng)
+    about = f"Shop of {of.area:.0f} m2, unitary heat pump of {of.capacity / 1e3:.1f} kW"
+    return about, partial(shop, of), partial(of_shop, of)
+
+
+def _cooled_shop(rng: np.random.Generator) -> _Parts:
+    """Draw a shop that its unitary heat pump cools."""
+    of = _shop_of(rng)
+    walls = 2.0 * of.area + 2.0 * of.length * of.height
+    need = _gain(of.fabric, of.area, walls, of.glass, of.height, 75.0 * of.people + of.appliances)
+    of = replace(of, cooled=True, capacity=round(need * float(rng.uniform(1.2, 2.0)), -2))
+    about = f"Shop of {of.area:.0f} m2 in summer, unitary heat pump of {of.capacity / 1e3:.1f} kW"
     return about, partial(shop, of), partial(of_shop, of)
 
 
@@ -111,8 +142,8 @@ def _rooms(rng: np.random.Generator, long: tuple[float, float], height: tuple[fl
     return Rooms(columns, rows, length, depth, tall, (share * length * tall, share * depth * tall))
 
 
-def _office(rng: np.random.Generator) -> _Parts:
-    """Draw an office with fan coils on one heat pump."""
+def _office_of(rng: np.random.Generator) -> Office:
+    """Draw an office."""
     fabric, rooms = _fabric(rng), _rooms(rng, (7.0, 14.0), (2.7, 3.4))
     count, (walls, glass) = len(rooms.names), rooms.outer
     need = _loss(fabric, count * rooms.area, 2.0 * count * rooms.area + walls - glass, glass, rooms.height)
@@ -122,10 +153,35 @@ def _office(rng: np.random.Generator) -> _Parts:
         float(rng.uniform(0.2, 0.4)),
     )  # fmt: skip
     begin = int(rng.integers(6, 10))
-    of = Office(fabric, rooms, machine, coil, round(rooms.area / float(rng.uniform(10.0, 25.0))),
-                rooms.area * float(rng.uniform(1.0, 5.0)), (begin, begin + int(rng.integers(8, 12))))  # fmt: skip
-    about = (f"Office of {count * rooms.area:.0f} m2, {count} fan coils of {coil / 1e3:.1f} kW, "
-             f"heat pump of {machine.capacity / 1e3:.1f} kW")  # fmt: skip
+    return Office(fabric, rooms, machine, coil, round(rooms.area / float(rng.uniform(10.0, 25.0))),
+                  rooms.area * float(rng.uniform(1.0, 5.0)), (begin, begin + int(rng.integers(8, 12))))  # fmt: skip
+
+
+def _told(of: Office) -> str:
+    count = len(of.rooms.names)
+    return f"Office of {count * of.rooms.area:.0f} m2, {count} fan coils of {of.coil / 1e3:.1f} kW"
+
+
+def _office(rng: np.random.Generator) -> _Parts:
+    """Draw an office with fan coils on one heat pump."""
+    of = _office_of(rng)
+    about = f"{_told(of)}, heat pump of {of.machine.capacity / 1e3:.1f} kW"
+    return about, partial(office, of), partial(of_office, of)
+
+
+def _cooled_office(rng: np.random.Generator) -> _Parts:
+    """Draw an office whose fan coils one chiller cools."""
+    of = _office_of(rng)
+    count, (walls, glass) = len(of.rooms.names), of.rooms.outer
+    area, inside = count * of.rooms.area, count * (75.0 * of.people + of.appliances)
+    need = _gain(of.fabric, area, area + walls - glass, glass, of.rooms.height, inside)
+    coil = round(need / count * float(rng.uniform(1.5, 2.5)), -2)
+    chiller = Chiller(
+        round(need * float(rng.uniform(1.3, 2.0)), -2), float(rng.uniform(2.6, 3.6)), float(rng.uniform(0.1, 0.4)),
+        float(rng.uniform(0.2, 0.4)),
+    )  # fmt: skip
+    of = replace(of, coil=coil, chiller=chiller)
+    about = f"{_told(of)} in summer, chiller of {chiller.capacity / 1e3:.1f} kW"
     return about, partial(office, of), partial(of_office, of)
 
 

@@ -94,7 +94,7 @@ def test_drawn_buildings_are_the_same_again_and_differ(models: Callable[[str], M
     drawn = models("drawn")
     first, again = drawn.drawn_plants(), drawn.drawn_plants()
     assert [plant.about for plant in first.values()] == [plant.about for plant in again.values()]
-    assert len(first) == 20 and len({plant.about for plant in first.values()}) == 20
+    assert len(first) == 28 and len({plant.about for plant in first.values()}) == 28
     told = [plant.description() for name, plant in first.items() if name in ("drawn_1", "drawn_2")]
     assert [list(each["zones"]) for each in told] == [["house"], ["flat_1", "flat_2"]]
     windows = first["drawn_1"].model()["Window"]
