@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from calibration.estimation.state_space import REFERENCE
 from mpc.errors import PlantError
 from mpc.identify.corrections import PowerCorrection, Reading
 from mpc.identify.curves import EMITTER, OUTDOOR, Curve, features_of
@@ -140,16 +141,23 @@ class MachineMap:
         """Power at any speed above zero, of all that is bought [W]."""
         return float(sum(curve.coefficients.get("standing", 0.0) for curve in self.powers.values()))
 
-    def efficiency(self, u: float, outdoor: float = OUTDOOR, emitter: float = EMITTER) -> float:
+    @property
+    def rating(self) -> tuple[float, float]:
+        """Outdoor air and emitter at which its efficiency is told [K]: 7 and 30 degC, or 33 and 20 where it cools."""
+        sign = self.machine.sign
+        return float(as_heated(OUTDOOR, sign)), EMITTER if sign > 0.0 else REFERENCE
+
+    def efficiency(self, u: float, outdoor: float | None = None, emitter: float | None = None) -> float:
         """Heat over what is bought [-].
 
         Parameters
         ----------
         u : float
             Load above 0 [-].
-        outdoor, emitter : float
-            Temperatures [K].
+        outdoor, emitter : float, optional
+            Temperatures, those of `rating` by default [K].
         """
+        outdoor, emitter = outdoor or self.rating[0], emitter or self.rating[1]
         bought = sum(curve(1.0, u, outdoor, emitter) for curve in self.powers.values())
         return float(self.heat(1.0, u, outdoor, emitter) / max(bought, 1e-6))
 

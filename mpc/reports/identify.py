@@ -165,7 +165,7 @@ def identify_verdict(found: Identified, made: Experiment | None) -> str:
         k = experiment_kpis(made)
         text += (
             f"The experiment spent {k.cost_tot * k.floor_area:.2f} {k.currency} on energy; zones were outside of their "
-            f"band by {significant(k.tdis_tot, 2)} K h on average, and the plant had its machines back for "
+            f"band by {k.tdis_tot:.2f} K h on average, and the plant had its machines back for "
             f"{percent(made.handed_back)} of the time."
         )
     return text.strip()
@@ -248,6 +248,10 @@ def _told(row: _Term) -> dict[str, Any]:
     return dict(zip(("what", "term", "value", "interval"), row[1:], strict=True))
 
 
+def _weather(outdoor: float, emitter: float) -> str:
+    return f"{outdoor - 273.15:.0f} °C outdoors and {emitter - 273.15:.0f} °C of the floor"
+
+
 def _content(found: Identified, made: Experiment | None, command: str) -> dict[str, Any]:
     box, index = found.model.box, found.telemetry.frame.index
     disturbance = box.disturbance
@@ -267,7 +271,7 @@ def _content(found: Identified, made: Experiment | None, command: str) -> dict[s
     if made is not None:
         k = experiment_kpis(made)
         cards += [(f"{k.cost_tot * k.floor_area:,.2f} {k.currency}", "energy during the experiment"),
-                  (f"{significant(k.tdis_tot, 2)} K h", "outside of the comfort band, mean zone")]  # fmt: skip
+                  (f"{k.tdis_tot:.2f} K h", "outside of the comfort band, mean zone")]  # fmt: skip
     return {
         "title": f"Model of {found.model.name}", "means": identify_means(found), "cards": cards,
         "verdict": identify_verdict(found, made),
@@ -278,6 +282,6 @@ def _content(found: Identified, made: Experiment | None, command: str) -> dict[s
         "slowest": significant(float(np.max(box.time_constants)) / 3600.0, 3),
         "unmeasured": significant(float(np.sqrt(np.mean(np.asarray(disturbance.deviation) ** 2))), 2),
         "lasting": significant(disturbance.time_constant / 3600.0, 2),
-        "at": f"{OUTDOOR - 273.15:.0f} °C outdoors and {EMITTER - 273.15:.0f} °C of the floor",
+        "at": _weather(*found.model.maps[0].rating), "coefficients_at": _weather(OUTDOOR, EMITTER),
         "error_pictures": error_pictures(found), "map_pictures": map_pictures(found), "course": course_pictures(found),
     }  # fmt: skip

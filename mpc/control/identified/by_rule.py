@@ -43,7 +43,7 @@ def estimate_rule(
     states, levels = planned
     by_rule = _rule(problem, ahead, parameters, (states[0], most, on))
     cost, heat = _bought(problem, ahead, *by_rule)
-    left = float(problem.model.box.capacity @ (states[-1] - by_rule[0][-1]))
+    left = problem.model.sign * float(problem.model.box.capacity @ (states[-1] - by_rule[0][-1]))
     stored = left * cost / heat if heat > 0.0 else 0.0
     return RuleEstimate(_bought(problem, ahead, states, levels)[0], cost, stored)
 
@@ -88,8 +88,9 @@ def _rule(
 
 
 def _bought(problem: IdentifiedProblem, ahead: Ahead, states: FloatArray, levels: FloatArray) -> tuple[float, float]:
-    """Cost [currency] and heat [J] of levels along states."""
+    """Cost [currency] and heat [J] of levels along states, or what is taken where machines cool."""
     model = problem.model
     powers = bought(model, ahead.beyond, states[:-1], levels, ahead.outdoor).sum(axis=1) + model.bought_anyway
     heat = model.box.delivered(model.heat(states[:-1], levels, ahead.outdoor), ahead.outdoor)
-    return float((powers * ahead.prices).sum()) * model.step / KILOWATT_HOUR, float(heat.sum()) * model.step
+    cost = float((powers * ahead.prices).sum()) * model.step / KILOWATT_HOUR
+    return cost, model.sign * float(heat.sum()) * model.step

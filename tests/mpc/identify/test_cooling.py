@@ -1,0 +1,212 @@
+"""Machines that cool: what holds of heating holds of them in temperatures that are mirrored about 20 degC."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from calibration.estimation.state_space import REFERENCE
+from calibration.grey_box.network import GreyBox
+from mpc.baselines.plants import FullSpeed
+from mpc.control.identified.controller import IdentifiedController
+from mpc.errors import PlantError
+from mpc.identify.curves import Curve
+from mpc.identify.excitation import Excitation, ExcitationSettings
+from mpc.identify.identify import identify
+from mpc.identify.machines import Machine, as_heated, find_machines
+from mpc.identify.maps import MachineMap
+from mpc.identify.model import PlantModel
+from mpc.identify.telemetry import SET, PlantTelemetry, Site
+from mpc.loop.actuators import COOLING_SETPOINT, HEATING_SETPOINT, Actuator
+from mpc.loop.plant import Measurements, PointLayout
+from mpc.scenario.forecast import Forecast
+from thermal._types import FloatArray
+from thermal.case.building import Location
+from thermal.case.points import HEATING_POWER, OUTDOOR_TEMPERATURE, ZONE_TEMPERATURE
+
+ROOMS, STEP = ("south", "north"), 900.0
+PLACE = Location(latitude=50.8, longitude=4.35, elevation=100.0, timezone="Etc/GMT-1")
+POINTS = {1.0: HEATING_SETPOINT, -1.0: COOLING_SETPOINT}
+BANDS = {1.0: ("lower", "upper"), -1.0: ("upper", "lower")}
+
+
+def setpoint_of(room: str, sign: float) -> str:
+    return f"{room}/{POINTS[sign]}"
+
+
+def machine_of(room: str, sign: float) -> Machine:
+    return Machine(Actuator(setpoint_of(room, sign), "K", 280.0, 306.0), "setpoint", (room,), f"{room}/{HEATING_POWER}")
+
+
+def model_of(sign: float, shared: tuple[tuple[float, float], ...] = ()) -> PlantModel:
+    """Two rooms with terminals of 4 kW, whose limits and common limit are those of the mirror."""
+    heat, box = Curve({"command": 4000.0}, {}), {room: 40.0 for room in ROOMS}
+    limits = tuple(sorted((as_heated(outdoor, sign), load) for outdoor, load in ((270.0, 0.9), (278.0, 1.0))))
+    maps = tuple(
+        MachineMap(machine_of(room, sign), "setpoint", heat, {"electricity": Curve({"command": 1500.0}, {})},
+                   (-0.1, 0.3), limits)
+        for room in ROOMS
+    )  # fmt: skip
+    network = GreyBox.start(box, (), {m.machine.name: m.machine.serves for m in maps}, (True, True))
+    common = tuple(sorted((as_heated(outdoor, sign), load) for outdoor, load in shared))
+    return PlantModel("rooms", STEP, network, maps, shared=common)
+
+
+def forecast_of(sign: float, outdoor: FloatArray, begin: str = "2023-01-09 05:15") -> pd.DataFrame:
+    stamps = pd.date_range(begin, periods=len(outdoor), freq="15min", tz="Etc/GMT-1")
+    hours = np.arange(len(outdoor)) // 4
+    edges = np.where((hours % 24 >= 3) & (hours % 24 < 13), 293.15, 288.15), np.full(len(outdoor), 297.15)
+    table = {OUTDOOR_TEMPERATURE: as_heated(outdoor, sign), "electricity_price": 0.2 + 0.1 * (hours % 5 == 0)}
+    for room in ROOMS:
+        table |= {f"{room}/comfort_{side}_temperature": as_heated(edge, sign)
+                  for side, edge in zip(BANDS[sign], edges, strict=True)}  # fmt: skip
+        table |= {f"{room}/internal_gain": sign * 100.0, f"{room}/occupancy_count_sensor": 1.0}
+    return pd.DataFrame(table, index=stamps)
+
+
+def seen_of(sign: float, second: int, zones: FloatArray, heats: FloatArray, outdoor: float) -> Measurements:
+    names = [f"{room}/{ZONE_TEMPERATURE}" for room in ROOMS] + [f"{room}/{HEATING_POWER}" for room in ROOMS]
+    layout = PointLayout((*names, f"weather_station/{OUTDOOR_TEMPERATURE}"), "Etc/GMT-1")
+    return Measurements(layout, second, [*as_heated(zones, sign), *(sign * heats), as_heated(outdoor, sign)])
+
+
+def test_a_controller_that_cools_does_what_one_that_heats_does_in_the_mirror() -> None:
+    rng = np.random.default_rng(3)
+    outdoor = 273.0 + 5.0 * np.sin(np.arange(80) / 12.0)
+    zones = 293.0 + np.cumsum(rng.normal(0.0, 0.25, (20, 2)), axis=0)
+    heats = rng.uniform(0.0, 3600.0, (20, 2))
+    told, kept = {}, {}
+    for sign in (1.0, -1.0):
+        model = model_of(sign, ((272.0, 0.7),))
+        controller = IdentifiedController(model, tuple(m.machine.actuator for m in model.maps), PLACE)
+        forecast = forecast_of(sign, outdoor)
+        rows = []
+        for k in range(20):
+            second = int(forecast.index[k].timestamp()) - 900
+            seen = seen_of(sign, second, zones[k], heats[k], outdoor[max(k - 1, 0)])
+            action = controller.step(seen, Forecast(forecast.iloc[k : k + 32]))
+            assert action.source == "optimal plan"
+            assert action.compare is not None
+            rule = action.compare()
+            rows.append([*(as_heated(action[setpoint_of(room, sign)], sign) for room in ROOMS),
+                         rule.plan, rule.rule, rule.stored])  # fmt: skip
+        told[sign] = np.array(rows)
+        assert controller.conformal is not None and controller.conformal.count == 38
+        kept[sign] = controller.conformal.values
+    np.testing.assert_allclose(told[1.0], told[-1.0], atol=2e-3)
+    np.testing.assert_allclose(kept[1.0], kept[-1.0])
+    assert np.ptp(told[1.0][:, :2]) > 2.0 and controller.conformal.outside > 0  # of something that happened
+    assert (np.abs(told[1.0][:, 2:]).max(axis=0) > 0.05).all()
+
+
+def telemetry_of(sign: float, rows: Mapping[str, FloatArray]) -> PlantTelemetry:
+    """Five days of a room, as they are or in the mirror."""
+    stamps = pd.date_range("2023-01-09 00:15", periods=len(rows["outdoor"]), freq="15min", tz="Etc/GMT-1")
+    frame = {
+        f"weather_station/{OUTDOOR_TEMPERATURE}": as_heated(rows["outdoor"], sign), "electricity": rows["bought"],
+        f"south/{ZONE_TEMPERATURE}": as_heated(rows["zone"], sign), f"south/{HEATING_POWER}": sign * rows["heat"],
+        f"{SET}{setpoint_of('south', sign)}": as_heated(rows["setpoint"], sign),
+    }  # fmt: skip
+    return PlantTelemetry(pd.DataFrame(frame, index=stamps), STEP, Site("room", {"south": 40.0}, PLACE))
+
+
+@pytest.fixture(scope="module")
+def recorded() -> dict[str, FloatArray]:
+    """Air and walls of a room under a proportional thermostat of 3 kW that is asked for much on cold mornings."""
+    rng, count = np.random.default_rng(1), 5 * 96
+    hours = np.arange(count) / 4.0
+    outdoor = 272.0 + 4.0 * np.sin(2.0 * np.pi * (hours - 9.0) / 24.0) + np.cumsum(rng.normal(0.0, 0.1, count))
+    setpoint = np.repeat(rng.uniform(289.0, 296.0, count // 6), 6)
+    air, wall, zone, heat = 291.0, 289.0, np.empty(count), np.empty(count)
+    for k in range(count):
+        parts = []
+        for _ in range(15):
+            given = 3000.0 * np.clip((setpoint[k] - air) / 0.6, 0.0, 1.0)
+            air += 60.0 / 6e5 * (given + 200.0 * (wall - air) + 30.0 * (outdoor[k] - air))
+            wall += 60.0 / 8e6 * (200.0 * (air - wall) + 40.0 * (outdoor[k] - wall))
+            parts.append((air, given))
+        zone[k], heat[k] = np.mean(parts, axis=0)
+    zone += rng.normal(0.0, 0.02, count)
+    return {"outdoor": outdoor, "setpoint": setpoint, "zone": zone, "heat": heat, "bought": 150.0 + heat / 3.0}
+
+
+def test_what_is_identified_of_cooling_is_that_of_heating_in_the_mirror(recorded: dict[str, FloatArray]) -> None:
+    found = {s: identify(telemetry_of(s, recorded), [machine_of("south", s)]) for s in (1.0, -1.0)}
+    heated, cooled = found[1.0], found[-1.0]
+    errors = [[error.grey_box for error in each.errors] for each in (heated, cooled)]
+    np.testing.assert_allclose(errors[0], errors[1], rtol=2e-3)
+    assert max(errors[0]) < 0.6 and cooled.model.sign == -1.0
+    for a, b in zip(heated.model.maps, cooled.model.maps, strict=True):
+        assert a.above == pytest.approx(b.above, abs=1e-6) and 0.0 < a.above[1] < 1.0
+        mirrored = sorted((as_heated(outdoor, -1.0), load) for outdoor, load in b.limits)
+        np.testing.assert_allclose(a.limits, mirrored, rtol=1e-6)
+        assert len(a.limits) > 1 and b.heat.coefficients["command"] > 2000.0
+    assert float(cooled.model.heat(np.zeros((1, 4)), np.ones((1, 1)), 303.15)[0, 0]) < -2000.0
+    assert PlantModel.from_dict(cooled.model.to_dict()).sign == -1.0
+
+
+def test_setpoints_of_cooling_are_chosen_when_they_are_asked_for() -> None:
+    actuators = [Actuator(setpoint_of(room, sign), "K", 285.0, 305.0) for room in ROOMS for sign in (1.0, -1.0)]
+    columns = [f"{room}/{HEATING_POWER}" for room in ROOMS]
+    heating = find_machines(actuators, columns, ROOMS)
+    cooling = find_machines(actuators, columns, ROOMS, cooling=True)
+    assert [m.name for m in heating] == [setpoint_of(room, 1.0) for room in ROOMS]
+    assert [m.name for m in cooling] == [setpoint_of(room, -1.0) for room in ROOMS]
+    assert {m.sign for m in heating} == {1.0} and {m.sign for m in cooling} == {-1.0}
+    assert all(m.role == "setpoint" and m.heat == f"{m.serves[0]}/{HEATING_POWER}" for m in cooling)
+    assert cooling[0].beside == heating[0].actuator and heating[1].beside == cooling[1].actuator
+    both = (setpoint_of("south", 1.0), setpoint_of("north", -1.0))
+    with pytest.raises(PlantError, match="machines that all heat, or all cool"):
+        find_machines(actuators, columns, ROOMS, both)
+    with pytest.raises(PlantError, match="expected a zone_air_cooling_temperature_setpoint"):
+        find_machines(actuators[::2], columns, ROOMS, cooling=True)
+
+
+def test_setpoints_of_a_zone_never_cross() -> None:
+    heating, cooling = (machine_of("south", sign) for sign in (1.0, -1.0))
+    both = [replace(a, beside=b.actuator) for a, b in ((heating, cooling), (cooling, heating))]
+    for machine in both:
+        for value in np.linspace(288.0, 300.0, 13):
+            values = machine.told(float(value), 297.15 if machine.sign > 0.0 else 293.15)
+            apart = values[cooling.name] - values[heating.name]
+            assert values[machine.name] == value and apart >= 1.0 - 1e-9
+    assert both[0].told(293.15, 297.15)[cooling.name] == 297.15  # at the other edge of the band where there is room
+    assert heating.told(293.15, 297.15) == {heating.name: 293.15}
+
+
+def test_the_rule_cools_to_the_lowest_edge_of_the_coming_hours() -> None:
+    machine = replace(machine_of("south", -1.0), beside=machine_of("south", 1.0).actuator)
+    table = forecast_of(-1.0, np.full(32, 290.0))
+    upper = table["south/comfort_upper_temperature"].to_numpy()
+    assert upper[0] == as_heated(288.15, -1.0) and upper[12] == as_heated(293.15, -1.0)
+    seen = seen_of(-1.0, 0, np.full(2, 293.0), np.zeros(2), 290.0)
+    for first, edge in ((0, 288.15), (1, 293.15)):  # an hour or less than three before the edge falls
+        told = FullSpeed([machine]).step(seen, Forecast(table.iloc[first:]))
+        assert told[setpoint_of("south", -1.0)] == pytest.approx(as_heated(edge, -1.0))
+        assert told[setpoint_of("south", 1.0)] == pytest.approx(as_heated(297.15, -1.0))
+
+
+@pytest.mark.parametrize("beside", [False, True])
+def test_an_excitation_stays_clear_of_the_heating(beside: bool) -> None:
+    alone = machine_of("south", -1.0)
+    machine = replace(alone, beside=machine_of("south", 1.0).actuator) if beside else alone
+    table = forecast_of(-1.0, np.full(2000, 290.0))
+    low, high = as_heated(297.15, -1.0), as_heated(293.15, -1.0)
+    excitation, cooled = Excitation([machine], STEP, ExcitationSettings(seed=1)), []
+    for k in range(12, 52):  # while people are in
+        seen = seen_of(-1.0, 0, np.full(2, 293.0), np.zeros(2), 290.0)
+        told = excitation.step(seen, Forecast(table.iloc[12 + k % 4 : 12 + k % 4 + 48]))
+        cooled.append(told[machine.name])
+        if beside:
+            assert told[setpoint_of("south", 1.0)] <= told[machine.name] - 1.0 + 1e-9
+    assert low + 0.2 - 1e-9 <= min(cooled) and max(cooled) <= high - 0.2 + 1e-9 and np.ptp(cooled) > 1.0
+    assert (min(cooled) < 0.5 * (low + high)) == beside
+
+
+def test_a_mirror_is_its_own_inverse() -> None:
+    assert as_heated(as_heated(301.0, -1.0), -1.0) == 301.0 and as_heated(301.0, 1.0) == 301.0
+    assert as_heated(REFERENCE, -1.0) == REFERENCE
