@@ -13,8 +13,9 @@ from calibration.grey_box.network import GreyBox
 from mpc.errors import PlantError
 from mpc.identify.curves import EMITTER
 from mpc.identify.machines import Machine, as_heated, pairs_as_heated
-from mpc.identify.maps import Loads, led_heat, map_machines
+from mpc.identify.maps import led_heat, map_machines
 from mpc.identify.model import PlantModel
+from mpc.identify.regression import Loads
 from mpc.identify.shared import out_of_reach, shared_of
 from mpc.identify.source import find_source
 from mpc.identify.telemetry import CARRIERS, SET, PlantTelemetry

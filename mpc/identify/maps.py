@@ -9,33 +9,18 @@ from typing import Any, Literal
 import numpy as np
 
 from calibration.estimation.state_space import REFERENCE
-from mpc.errors import PlantError
 from mpc.identify.corrections import PowerCorrection, Reading
-from mpc.identify.curves import EMITTER, OUTDOOR, Curve, features_of
+from mpc.identify.curves import EMITTER, OUTDOOR, Curve
 from mpc.identify.limits import limits_of
 from mpc.identify.machines import Machine, as_heated, pairs_as_heated
-from thermal._types import BoolArray, FloatArray
+from mpc.identify.regression import IDLE, SAME, Loads, regress
+from thermal._types import FloatArray
 
 #: How a machine is run: whole or not at all for parts of the time, at any part load, or by a zone's own controller.
 Operation = Literal["duty", "modulated", "setpoint"]
 
-#: Spread of a temperature below which nothing is said of its effect [K].
-_TOLD = 0.5
-
-#: A level up to this is none [-].
-_IDLE = 1e-6
-
-#: Levels of the command that count as one [-].
-_SAME = 0.05
-
 #: Part loads at which efficiency is compared with that of full load [-], and what full load may be worse [-].
 _PARTS, WORSE = (0.3, 0.5, 0.7), 0.02
-
-#: Parts of the days of which each is left out once.
-_FOLDS = 5
-
-#: Steps over which errors of a regression may hang together (Newey and West 1987, doi:10.2307/1913610): an hour.
-_LAGS = 4
 
 #: Range of powers over those of a curve, less 1, that are believed [-].
 _RATIOS = (-0.6, 2.0)
@@ -162,52 +147,6 @@ class MachineMap:
         return float(self.heat(1.0, u, outdoor, emitter) / max(bought, 1e-6))
 
 
-@dataclass(frozen=True, eq=False)
-class Loads:
-    """Loads of the machines and temperatures that their maps hang on, one row a step.
-
-    Parameters
-    ----------
-    level : ndarray, shape (n_time, n_machine)
-        Loads [-]; NaN while unknown.
-    outdoor : ndarray, shape (n_time,)
-        Outdoor air [K].
-    emitter : ndarray, shape (n_time, n_machine)
-        Temperature of what each machine heats [K]; `EMITTER` where it is not known.
-    """
-
-    level: FloatArray
-    outdoor: FloatArray
-    emitter: FloatArray
-
-    @property
-    def known(self) -> BoolArray:
-        """Steps whose loads are all known, shape (n_time,)."""
-        return np.asarray(np.isfinite(self.level).all(axis=1))
-
-    def features(self, m: int) -> dict[str, FloatArray]:
-        """Features of a machine that its loads tell apart.
-
-        Parameters
-        ----------
-        m : int
-            Which machine.
-        """
-        rows = self.known
-        u, emitter, outdoor = self.level[rows, m], self.emitter[rows, m], self.outdoor[rows]
-        found = features_of((u > _IDLE).astype(float), u, outdoor, emitter)
-        running = u > _IDLE
-        levels = np.unique(np.round(u[running] / _SAME))
-        left_out = {
-            "standing": len(levels) < 2,
-            "command^2": len(levels) < 3,
-            "outdoor": running.sum() < 8 or np.std(outdoor[running]) < _TOLD,
-            "emitter": running.sum() < 8 or np.std(emitter[running]) < _TOLD,
-            "command^2 outdoor": len(levels) < 3 or np.std(outdoor[running]) < _TOLD,
-        }
-        return {name: values for name, values in found.items() if not left_out.get(name, False)}
-
-
 def led_heat(maps: Sequence[MachineMap]) -> FloatArray:
     """Full heat of machines that are led by a setpoint, 0 of others, shape (n_machine,) [W].
 
@@ -217,109 +156,6 @@ def led_heat(maps: Sequence[MachineMap]) -> FloatArray:
         Of a plant.
     """
     return np.array([float(m.at(m.heat, 1.0, OUTDOOR, EMITTER)) if m.operation == "setpoint" else 0.0 for m in maps])
-
-
-def _design(
-    loads: Loads, known: BoolArray, machines: Sequence[int], base: bool, standing: bool
-) -> tuple[FloatArray, list[tuple[int, str]]]:
-    """Columns of a regression, by machine and feature; a constant first, where something may be left."""
-    columns, owners = ([np.ones(int(known.sum()))], [(-1, "constant")]) if base else ([], [])
-    for m in machines:
-        for name, feature in loads.features(m).items():
-            column = feature[known[loads.known]]
-            if name != "standing" or (standing and not (base and column.all())):
-                columns.append(column)
-                owners.append((m, name))
-    return np.column_stack(columns), owners
-
-
-def design_of(loads: Loads, machines: Sequence[int], *, standing: bool = True) -> FloatArray:
-    """Columns of a regression, a constant first, shape (n_time, n_column); NaN where a load is unknown.
-
-    Parameters
-    ----------
-    loads : Loads
-        Of all machines.
-    machines : sequence of int
-        Which machines have a part in it.
-    standing : bool
-        Whether a machine may draw power at any load above 0.
-    """
-    columns, _ = _design(loads, loads.known, machines, True, standing)
-    design = np.full((len(loads.level), columns.shape[1]), np.nan)
-    design[loads.known] = columns
-    return design
-
-
-def left_out_error(design: FloatArray, values: FloatArray, per_day: int) -> float:
-    """Mean squared error of a regression on days that it has not seen [W2]: each fifth of the days is left out once.
-
-    Parameters
-    ----------
-    design : ndarray, shape (n_time, n_column)
-        Columns [their own]; rows that are not finite do not count.
-    values : ndarray, shape (n_time,)
-        Measured [W].
-    per_day : int
-        Steps of a day.
-    """
-    rows = np.flatnonzero(np.isfinite(values) & np.isfinite(design).all(axis=1))
-    fold, known, seen = (rows // per_day) % _FOLDS, design[rows], values[rows]
-    errors = np.empty(len(seen))
-    for k in range(_FOLDS):
-        out = fold == k
-        errors[out] = known[out] @ np.linalg.lstsq(known[~out], seen[~out])[0] - seen[out]
-    return float(np.mean(errors**2))
-
-
-def regress(
-    loads: Loads, values: FloatArray, machines: Sequence[int], *, base: bool = True, standing: bool = True
-) -> tuple[list[Curve], float]:
-    """Regress what is measured on the features of machines, a constant beside them.
-
-    Parameters
-    ----------
-    loads : Loads
-        Of all machines.
-    values : ndarray, shape (n_time,)
-        Measured [W].
-    machines : sequence of int
-        Which machines have a part in it.
-    base : bool
-        Whether something may be left when all machines are off; nothing tells that from the standing part of a machine
-        that never stops, which is then counted to it.
-    standing : bool
-        Whether a machine may draw power at any load above 0.
-
-    Returns
-    -------
-    list of Curve
-        One a machine.
-    float
-        The constant [W].
-
-    Raises
-    ------
-    PlantError
-        When there are too few steps with known loads.
-    """
-    from statsmodels.regression.linear_model import OLS
-
-    rows = loads.known & np.isfinite(values)
-    design, owners = _design(loads, rows, machines, base, standing)
-    PlantError.unless(
-        rows.sum() > 4 * len(owners), "component maps", f"{4 * len(owners)} steps with known commands", rows.sum(),
-        "give more days, or telemetry whose commands are recorded",
-    )  # fmt: skip
-    found = OLS(values[rows], design).fit(cov_type="HAC", cov_kwds={"maxlags": _LAGS})
-    with np.errstate(invalid="ignore"):  # of a feature that says next to nothing the variance may round below zero
-        deviations = np.asarray(found.bse)
-    parts = [
-        {name: (float(found.params[k]), float(deviations[k])) for k, (owner, name) in enumerate(owners) if owner == m}
-        for m in machines
-    ]
-    curves = [Curve({n: c for n, (c, _) in p.items()}, {n: d for n, (_, d) in p.items()}) for p in parts]
-    return curves, float(found.params[0]) if base else 0.0
 
 
 def map_machines(
@@ -351,7 +187,7 @@ def map_machines(
         Power of each kind that no machine explains [W].
     """
     everyone = range(len(machines))
-    stops = [bool((loads.level[:, m] <= _IDLE).any()) for m in everyone]
+    stops = [bool((loads.level[:, m] <= IDLE).any()) for m in everyone]
     heats = [regress(loads, signals[:, m], [m], base=stops[m])[0][0] for m in everyone]
     powers = {kind: regress(loads, values, everyone) for kind, values in bought.items() if np.ptp(values) > 1.0}
     made = []
@@ -372,7 +208,7 @@ def map_machines(
 
 def _with_own(found: MachineMap, m: int, loads: Loads, power: FloatArray) -> MachineMap:
     """Add what its own sensor says, and where that lies beside the curve."""
-    (curve,), idle = regress(loads, power, [m], base=bool((loads.level[:, m] <= _IDLE).any()))
+    (curve,), idle = regress(loads, power, [m], base=bool((loads.level[:, m] <= IDLE).any()))
     found = replace(found, own=OwnPower(curve, idle))
     learned = found.correction()
     for k in np.flatnonzero(loads.known & np.isfinite(power)):
@@ -393,7 +229,7 @@ def _operation(found: MachineMap) -> Operation:
 
 def _local(level: FloatArray, above: FloatArray) -> tuple[float, float]:
     """How far a setpoint lies above its zone at no load and at full load, by a line through the steps in between."""
-    between = np.isfinite(above) & (level > _SAME) & (level < 1.0 - _SAME)
+    between = np.isfinite(above) & (level > SAME) & (level < 1.0 - SAME)
     if between.sum() < 8 or np.ptp(level[between]) < 0.2:
         return 0.0, 1.0
     slope, zero = np.polyfit(level[between], above[between], 1)

@@ -191,7 +191,7 @@ def _source_of(entry: Mapping[str, Any] | None) -> Source | None:
     if entry is None:
         return None
     curves = {kind: Curve(**curve) for kind, curve in entry["powers"].items()}
-    return Source(curves, float(entry["full"]), float(entry["outdoor"]))
+    return Source(curves, float(entry["full"]), float(entry["least"]), float(entry["outdoor"]))
 
 
 def read_model(folder: Path) -> PlantModel:

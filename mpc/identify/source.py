@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from mpc.errors import PlantError
-from mpc.identify.curves import EMITTER, OUTDOOR, PER, Curve, interval_of
+from mpc.identify.curves import OUTDOOR, PER, Curve, interval_of
 from mpc.identify.machines import FULL
-from mpc.identify.maps import WORSE, Loads, MachineMap, design_of, led_heat, left_out_error, regress
+from mpc.identify.maps import WORSE, MachineMap, led_heat
+from mpc.identify.regression import Loads, curve_of, design_of, least_squares, left_out_error
 from mpc.identify.shared import shares_of
 from mpc.identify.telemetry import CARRIERS
 from thermal._types import FloatArray
@@ -21,47 +22,58 @@ _BETTER = 0.9
 #: Part of full load that is compared with it [-].
 _HALF = 0.5
 
-#: Feature that says whether part load is dear.
-_SQUARE = "command^2"
+#: Loads below which a source may go on and off [-]: those that are tried. Heat pumps and chillers modulate down to 0.1
+#: to 0.5 of what they have, which is less than the sum of their terminals.
+_LEAST = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5)
+
+#: What is regressed on, see `Source`.
+_STANDING = "standing"
+_FEATURES = ("command", _STANDING, "outdoor", "standing outdoor")
 
 
 @dataclass(frozen=True)
 class Source:
-    """What a heat pump or boiler buys for all its terminals, over their load Q, a share of the sum of their full loads.
+    """What a heat pump, chiller or boiler buys for all its terminals, over their load Q.
 
-    ``P = b Q + c Q² + (d Q + f Q²) (T_out - 7 degC) / 10 K``. A source draws power whenever it runs, so that half of
-    its heat takes more than half of its power (c < 0): terminals that want heat in turns keep it at part load, and at
-    once they let it rest in between. Maps of each terminal alone cannot know that.
+    ``P = b Q + s r + (d Q + f r) (T_out - T) / 10 K`` with ``r = min(Q / q, 1)``, the share of the time that it runs,
+    and Q a share of the sum of the terminals' full loads. A source draws power whenever it runs (s), whatever it gives,
+    and below its least load q it goes on and off. So half of its heat takes more than half of its power, and heat that
+    is taken while it runs anyhow costs b alone: terminals that want heat in turns keep it running, and at once they let
+    it rest in between. Maps of each terminal alone cannot know that.
 
-    Each parabola is held to be concave and not to fall, in any weather: c is 0 at most, b 0 at least, and beyond the
-    load of its vertex nothing more is bought.
+    It is held concave and rising in any weather: b and s are 0 at least.
 
     Parameters
     ----------
     powers : mapping of str to Curve
-        Of each kind that is bought [W].
+        Of each kind that is bought: b, s, d and f, called ``command``, ``standing``, ``outdoor`` and ``standing
+        outdoor`` [W].
     full : float
-        Load up to which it is known, above 0: that of full load, the 98th percentile of what was seen [-].
+        Full load, the 98th percentile of what was seen, above 0 [-].
+    least : float
+        q, above 0 [-].
     outdoor : float
-        Median outdoor air of the telemetry [K].
+        T, the median outdoor air of the telemetry [K].
 
     Raises
     ------
     PlantError
-        When the full load is not above 0, or a kind is unknown.
+        When a load is not above 0, or a kind is unknown.
     """
 
     powers: Mapping[str, Curve]
     full: float
+    least: float
     outdoor: float = OUTDOOR
 
     def __post_init__(self) -> None:
-        PlantError.unless(self.full > 0.0, "source: full", "a load above 0", f"{self.full:g}")
+        for name, load in (("full", self.full), ("least", self.least)):
+            PlantError.unless(load > 0.0, f"source: {name}", "a load above 0", f"{load:g}")
         for kind in self.powers:
             PlantError.unless_known(kind, CARRIERS, "source: powers", "a kind that is bought")
 
     def at(self, load: FloatArray, outdoor: FloatArray | float) -> FloatArray:
-        """Power of each kind, shape (..., n_carrier) [W]: beyond the load up to which it is known, by its slope there.
+        """Power of each kind, shape (..., n_carrier) [W].
 
         Parameters
         ----------
@@ -70,21 +82,19 @@ class Source:
         outdoor : ndarray, shape (...), or float
             Outdoor air [K].
         """
-        powers = np.zeros((*np.shape(load), len(CARRIERS)))
-        for kind in self.powers:
-            by_load, squared, known = self._parabola(kind, outdoor)
-            at = np.minimum(load, known)
-            beyond = (by_load + 2.0 * squared * at) * (load - at)
-            powers[..., CARRIERS.index(kind)] = by_load * at + squared * at**2 + beyond
-        return powers
+        by_load, standing = self._weights(outdoor)
+        runs = np.minimum(load / self.least, 1.0)
+        return np.asarray(by_load * np.asarray(load)[..., None] + standing * runs[..., None])
 
-    def _parabola(self, kind: str, outdoor: FloatArray | float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Coefficients of load and its square [W], and the load up to which they hold [-], in some weather."""
-        terms, warmer = self.powers[kind].coefficients, (np.asarray(outdoor) - OUTDOOR) / PER
-        by_load = np.maximum(terms.get("command", 0.0) + terms.get("outdoor", 0.0) * warmer, 0.0)
-        squared = np.minimum(terms.get("command^2", 0.0) + terms.get("command^2 outdoor", 0.0) * warmer, 0.0)
-        vertex = np.divide(by_load, -2.0 * squared, out=np.full(np.shape(warmer), np.inf), where=squared < 0.0)
-        return by_load, squared, np.minimum(vertex, self.full)
+    def _weights(self, outdoor: FloatArray | float) -> tuple[FloatArray, FloatArray]:
+        """Power by load and while it runs, in some weather, shape (..., n_carrier) each [W]."""
+        warmer = (np.asarray(outdoor) - self.outdoor) / PER
+        found = np.zeros((2, *warmer.shape, len(CARRIERS)))
+        for kind, curve in self.powers.items():
+            by_load, standing, warm, warm_standing = (curve.coefficients.get(name, 0.0) for name in _FEATURES)
+            found[0, ..., CARRIERS.index(kind)] = by_load + warm * warmer
+            found[1, ..., CARRIERS.index(kind)] = standing + warm_standing * warmer
+        return tuple(np.maximum(found, 0.0))
 
     def lines(
         self, outdoor: FloatArray, most: FloatArray, planned: FloatArray | None = None
@@ -104,21 +114,18 @@ class Source:
 
         Examples
         --------
-        >>> source = Source({"electricity": Curve({"command": 6e3, "command^2": -2e3}, {})}, 1.0)
+        >>> source = Source({"electricity": Curve({"command": 4e3, "standing": 1e3}, {})}, 1.0, 0.2)
         >>> at_none, by_load = source.lines(np.full(2, 280.15), np.ones(2), np.array([0.0, 0.5]))
         >>> at_none[:, 0].round(6).tolist(), by_load[:, 0].round(3).tolist()
-        ([0.0, 500.0], [6000.0, 4000.0])
+        ([0.0, 1000.0], [9000.0, 4000.0])
         """
-        full = np.minimum(most, self.full)
         if planned is None:
+            full = np.minimum(most, self.full)
             whole = self.at(full, outdoor)
             return np.zeros_like(whole), whole / full[:, None]
-        at = np.clip(planned, 0.0, full)
-        slope = np.zeros((len(at), len(CARRIERS)))
-        for kind in self.powers:
-            by_load, squared, known = self._parabola(kind, outdoor)
-            slope[:, CARRIERS.index(kind)] = by_load + 2.0 * squared * np.minimum(at, known)
-        return self.at(at, outdoor) - slope * at[:, None], slope
+        by_load, standing = self._weights(outdoor)
+        runs = (planned >= self.least)[:, None]
+        return np.where(runs, standing, 0.0), by_load + np.where(runs, 0.0, standing / self.least)
 
     @property
     def dearer(self) -> float:
@@ -133,9 +140,10 @@ def find_source(
     """Find whether one source feeds all machines, by what they buy.
 
     It does where the load of all of them tells what is bought on left-out days better than the loads of each: better
-    than a map for each, and better than the same parabola of each one's load, which has as many coefficients: being the
-    smaller model is no merit. Its curvature must be told apart from none, and heat be dearer at half load than at full
-    load. Machines that are commanded, or have sensors of their own power, have maps of their own.
+    than a map for each, and better than sources of their own that are all alike, which have as many coefficients: being
+    the smaller model is no merit. What it draws while it runs must be told apart from nothing, and heat be dearer at
+    half load than at full load. Machines that are commanded, or have sensors of their own power, have maps of their
+    own.
 
     Parameters
     ----------
@@ -159,25 +167,30 @@ def find_source(
     own = any(m.operation != "setpoint" or m.machine.power for m in maps)
     if len(maps) < 2 or not kinds or own:
         return None, {}
-    shares = shares_of(led_heat(maps))
+    shares, middle = shares_of(led_heat(maps)), float(np.median(loads.outdoor))
     total = loads.level @ shares
-    together = Loads(total[:, None], loads.outdoor, np.full((len(total), 1), EMITTER))
-    designs = [design_of(together, [0], standing=False), design_of(loads, range(len(maps))), _alike(loads, shares)]
-    errors = np.sum([[left_out_error(design, bought[kind], per_day) for design in designs] for kind in kinds], axis=0)
     full = float(np.nanquantile(total, FULL))
-    if full <= 0.0 or not errors[0] < _BETTER * errors[1:].min():
+
+    def error(design: FloatArray) -> float:
+        return float(np.sum([left_out_error(design, bought[kind], per_day) for kind in kinds]))
+
+    designs = {least: _design(total[:, None], np.ones(1), loads.outdoor - middle, least) for least in _LEAST}
+    errors = {least: error(design) for least, design in designs.items()}
+    alike = min(error(_design(loads.level, shares, loads.outdoor - middle, least)) for least in _LEAST)
+    least = min(errors, key=errors.__getitem__)
+    if full <= 0.0 or not errors[least] < _BETTER * min(alike, error(design_of(loads, range(len(maps))))):
         return None, {}
-    curves = {kind: regress(together, bought[kind], [0], standing=False) for kind in kinds}
-    source = Source({kind: curve for kind, ((curve,), _) in curves.items()}, full, float(np.median(loads.outdoor)))
-    squares = [curve for curve in source.powers.values() if _SQUARE in curve.coefficients]
-    bent = any(interval_of(curve, _SQUARE)[1] < 0.0 for curve in squares)
-    if not bent or source.dearer <= 1.0 + WORSE:
-        return None, {}
-    return source, {kind: base for kind, (_, base) in curves.items()}
+    curves, base = {}, {}
+    for kind in kinds:
+        rows = np.isfinite(total) & np.isfinite(bought[kind])
+        found, deviations = least_squares(designs[least][rows], bought[kind][rows])
+        curves[kind], base[kind] = curve_of(("", *_FEATURES), found, deviations), float(found[0])
+    source = Source(curves, full, least, middle)
+    stands = any(interval_of(curve, _STANDING)[0] > 0.0 for curve in curves.values())
+    return (source, base) if stands and source.dearer > 1.0 + WORSE else (None, {})
 
 
-def _alike(loads: Loads, shares: FloatArray) -> FloatArray:
-    """Columns of machines of their own that are all alike, shape (n_time, 5): a constant, and sums over machines."""
-    warmer = (loads.outdoor - OUTDOOR) / PER
-    linear, squared = loads.level @ shares, loads.level**2 @ shares
-    return np.column_stack([np.ones(len(linear)), linear, squared, linear * warmer, squared * warmer])
+def _design(level: FloatArray, shares: FloatArray, beyond: FloatArray, least: float) -> FloatArray:
+    """Columns of a regression: a constant, and `_FEATURES` summed over sources by their shares, shape (n_time, 5)."""
+    load, runs = level @ shares, np.minimum(level / least, 1.0) @ shares
+    return np.column_stack([np.ones(len(load)), load, runs, load * beyond / PER, runs * beyond / PER])

@@ -22,6 +22,7 @@ from mpc.studies.excited import Experiment
 #: What terms of a map are called.
 _TERMS = {
     "standing": "at any speed above zero", "command": "times the load", "command^2": "times the load squared",
+    "standing outdoor": "at any speed above zero, outdoor air 10 K warmer",
     "outdoor": "times the load, outdoor air 10 K warmer", "emitter": "times the load, floor 10 K warmer",
     "command^2 outdoor": "times the load squared, outdoor air 10 K warmer",
 }  # fmt: skip
@@ -118,7 +119,8 @@ def identify_summary(found: Identified, made: Experiment | None) -> dict[str, An
             for m in found.model.maps
         },
         "source": None if found.model.source is None else {
-            "full_load": found.model.source.full, "half_over_full": found.model.source.dearer,
+            "full_load": found.model.source.full, "least_load": found.model.source.least,
+            "half_over_full": found.model.source.dearer, "outdoor": found.model.source.outdoor,
             "terms": [_told(row) for row in _source_terms(found.model.source)],
         },
         "time_constants_hours": (box.time_constants / 3600.0).tolist(), "heat_loss": box.heat_loss.tolist(),
@@ -248,6 +250,13 @@ def _told(row: _Term) -> dict[str, Any]:
     return dict(zip(("what", "term", "value", "interval"), row[1:], strict=True))
 
 
+def _source_words(source: Source) -> str:
+    """Say at which weather a source's terms are, and below which load it goes on and off."""
+    return (
+        f"Those of the source at {source.outdoor - 273.15:.0f} °C; below a load of {source.least:g} it goes on and off."
+    )
+
+
 def _weather(outdoor: float, emitter: float) -> str:
     return f"{outdoor - 273.15:.0f} °C outdoors and {emitter - 273.15:.0f} °C of the floor"
 
@@ -283,5 +292,6 @@ def _content(found: Identified, made: Experiment | None, command: str) -> dict[s
         "unmeasured": significant(float(np.sqrt(np.mean(np.asarray(disturbance.deviation) ** 2))), 2),
         "lasting": significant(disturbance.time_constant / 3600.0, 2),
         "at": _weather(*found.model.maps[0].rating), "coefficients_at": _weather(OUTDOOR, EMITTER),
+        "source": None if found.model.source is None else _source_words(found.model.source),
         "error_pictures": error_pictures(found), "map_pictures": map_pictures(found), "course": course_pictures(found),
     }  # fmt: skip

@@ -12,8 +12,9 @@ from mpc.control.identified.beyond import KNOTS, PowerLearner, beyond, weights_o
 from mpc.identify.corrections import PowerCorrection
 from mpc.identify.curves import Curve
 from mpc.identify.machines import Machine
-from mpc.identify.maps import Loads, MachineMap, OwnPower, map_machines
+from mpc.identify.maps import MachineMap, OwnPower, map_machines
 from mpc.identify.model import PlantModel
+from mpc.identify.regression import Loads
 from mpc.loop.actuators import HEATING_SETPOINT, Actuator
 from mpc.loop.plant import Measurements, PointLayout
 

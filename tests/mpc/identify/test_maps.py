@@ -8,7 +8,8 @@ import pytest
 from mpc.errors import PlantError
 from mpc.identify.curves import interval_of
 from mpc.identify.machines import Machine, find_machines
-from mpc.identify.maps import Loads, map_machines, regress
+from mpc.identify.maps import map_machines
+from mpc.identify.regression import Loads, regress
 from mpc.loop.actuators import Actuator
 
 SPEED = Machine(Actuator("hp/speed", "1", 0.0, 1.0, kind="continuous"), "machine", ("a",), "hp/heating_power_sensor")

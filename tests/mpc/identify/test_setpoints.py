@@ -16,8 +16,9 @@ from mpc.errors import PlantError
 from mpc.identify.curves import Curve
 from mpc.identify.limits import HeatLimit
 from mpc.identify.machines import Machine, find_machines
-from mpc.identify.maps import Loads, MachineMap, map_machines
+from mpc.identify.maps import MachineMap, map_machines
 from mpc.identify.model import PlantModel
+from mpc.identify.regression import Loads
 from mpc.loop.actuators import HEATING_SETPOINT, Actuator
 from mpc.loop.plant import Measurements, PointLayout
 from mpc.scenario.forecast import Forecast

@@ -17,8 +17,9 @@ from mpc.control.identified.electric import Electric, ElectricNow
 from mpc.errors import ControlError, PlantError
 from mpc.identify.curves import EMITTER, Curve
 from mpc.identify.machines import Machine
-from mpc.identify.maps import Loads, MachineMap, design_of, left_out_error, map_machines
+from mpc.identify.maps import MachineMap, map_machines
 from mpc.identify.model import PlantModel
+from mpc.identify.regression import Loads, design_of, left_out_error
 from mpc.identify.source import Source, find_source
 from mpc.identify.telemetry import CARRIERS
 from mpc.loop.actuators import HEATING_SETPOINT, Actuator
@@ -61,8 +62,8 @@ def test_a_heat_pump_is_found_behind_its_terminals() -> None:
     for outdoor in (270.0, 280.0):
         load = np.array([0.15, 0.3, 0.5, source.full])
         said, true = base["electricity"] + source.at(load, outdoor)[:, 0], 300.0 + _heat_pump(load, outdoor)
-        assert said == pytest.approx(true, rel=0.08)
-    assert source.dearer > 1.08 and base["electricity"] == pytest.approx(300.0, abs=150.0)
+        assert said == pytest.approx(true, rel=0.01)
+    assert source.least == 0.25 and source.dearer > 1.08 and base["electricity"] == pytest.approx(300.0, abs=20.0)
 
 
 def _each(loads: Loads) -> np.ndarray:
@@ -114,8 +115,8 @@ def test_rooms_that_move_together_beside_metered_lights_are_none(seed: int) -> N
 
 
 def _source() -> Source:
-    terms = {"command": 13e3, "command^2": -5e3, "outdoor": -3e3, "command^2 outdoor": 2e3}
-    return Source({"electricity": Curve(terms, dict.fromkeys(terms, 0.0))}, 0.7)
+    terms = {"command": 6e3, "standing": 2.5e3, "outdoor": -2e3, "standing outdoor": 0.2e3}
+    return Source({"electricity": Curve(terms, dict.fromkeys(terms, 0.0))}, 0.7, 0.15)
 
 
 def test_lines_touch_where_planned_and_lie_nowhere_below() -> None:
@@ -128,30 +129,34 @@ def test_lines_touch_where_planned_and_lie_nowhere_below() -> None:
         power = source.at(np.full(5, load), outdoor)
         assert (at_none + by_load * load >= power - 1e-6).all()
         assert load > source.full or (slope * load <= power + 1e-6).all()
-    touching = np.minimum(planned, source.full)
-    np.testing.assert_allclose(at_none[:, 0] + by_load[:, 0] * touching, source.at(touching, outdoor)[:, 0])
-    more, less = (source.at(touching - 0.01 + d, outdoor) for d in (1e-4, -1e-4))
-    np.testing.assert_allclose(by_load[1:3], ((more - less) / 2e-4)[1:3], rtol=0.05)
+    np.testing.assert_allclose(at_none + by_load * planned[:, None], source.at(planned, outdoor))
+    more, less = (source.at(planned + d, outdoor) for d in (1e-4, -1e-4))
+    np.testing.assert_allclose(by_load[1:], ((more - less) / 2e-4)[1:], rtol=1e-6)
+    assert by_load[1, 0] > by_load[2, 0]  # while it goes on and off its standing power is the price of heat, too
     held = source.lines(outdoor, np.full(5, 0.4))[1]
     np.testing.assert_allclose(held * 0.4, source.at(np.full(5, 0.4), outdoor))  # full load is what there is
 
 
-@pytest.mark.parametrize("squared", [-12e3, 4e3])
-def test_a_parabola_that_falls_or_rises_steeply_is_held_concave_and_rising(squared: float) -> None:
-    """Past its vertex nothing more is bought, and where cold bends it upwards it is straight."""
-    source, load = Source({"gas": Curve({"command": 13e3, "command^2": squared}, {})}, 0.7), np.linspace(0.0, 1.2, 60)
-    power = source.at(load, 280.15)[:, CARRIERS.index("gas")]
+@pytest.mark.parametrize("terms", [(-2e3, 9e3, 0.0, 0.0), (5e3, 1e3, 0.0, 2e3), (5e3, -1e3, -9e3, 0.0)])
+def test_power_is_held_concave_and_rising_in_any_weather(terms: tuple[float, ...]) -> None:
+    """Whatever a regression says of weather that it has not seen."""
+    curve = Curve(dict(zip(("command", "standing", "outdoor", "standing outdoor"), terms, strict=True)), {})
+    source, load = Source({"gas": curve}, 0.7, 0.2), np.linspace(0.0, 1.2, 61)
+    power = source.at(load, 270.15)[:, CARRIERS.index("gas")]
     assert (np.diff(power) >= -1e-9).all() and (np.diff(power, 2) <= 1e-9).all() and power[0] == 0.0
-    for planned in (0.0, 0.5, 0.65, 1.0):
-        at_none, by_load = source.lines(np.full(60, 280.15), np.full(60, np.inf), np.full(60, planned))
+    for planned in (0.0, 0.1, 0.5, 1.0):
+        outdoor = np.full(61, 270.15)
+        at_none, by_load = source.lines(outdoor, np.full(61, np.inf), np.full(61, planned))
         assert (at_none[:, 1] + by_load[:, 1] * load >= power - 1e-6).all() and not by_load[:, 0].any()
 
 
 def test_a_source_that_is_none_is_refused() -> None:
     with pytest.raises(PlantError, match="full: expected a load above 0, found 0"):
-        Source({}, 0.0)
+        Source({}, 0.0, 0.2)
+    with pytest.raises(PlantError, match="least: expected a load above 0, found 0"):
+        Source({}, 0.5, 0.0)
     with pytest.raises(PlantError, match="oil"):
-        Source({"oil": Curve({}, {})}, 0.5)
+        Source({"oil": Curve({}, {})}, 0.5, 0.2)
     content = _office(_source()).to_dict()
     content["source"]["full"] = -1.0
     with pytest.raises(ControlError, match="a load above 0"):

@@ -1,0 +1,208 @@
+"""Regressions of what is measured on the loads of machines, and their errors on days that they have not seen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mpc.errors import PlantError
+from mpc.identify.curves import Curve, features_of
+from thermal._types import BoolArray, FloatArray
+
+#: Spread of a temperature below which nothing is said of its effect [K].
+_TOLD = 0.5
+
+#: A level up to this is none [-].
+IDLE = 1e-6
+
+#: Levels of the command that count as one [-].
+SAME = 0.05
+
+#: Parts of the days of which each is left out once.
+_FOLDS = 5
+
+#: Steps over which errors of a regression may hang together (Newey and West 1987, doi:10.2307/1913610): an hour.
+_LAGS = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Loads:
+    """Loads of the machines and temperatures that their maps hang on, one row a step.
+
+    Parameters
+    ----------
+    level : ndarray, shape (n_time, n_machine)
+        Loads [-]; NaN while unknown.
+    outdoor : ndarray, shape (n_time,)
+        Outdoor air [K].
+    emitter : ndarray, shape (n_time, n_machine)
+        Temperature of what each machine heats [K]; `EMITTER` where it is not known.
+    """
+
+    level: FloatArray
+    outdoor: FloatArray
+    emitter: FloatArray
+
+    @property
+    def known(self) -> BoolArray:
+        """Steps whose loads are all known, shape (n_time,)."""
+        return np.asarray(np.isfinite(self.level).all(axis=1))
+
+    def features(self, m: int) -> dict[str, FloatArray]:
+        """Features of a machine that its loads tell apart.
+
+        Parameters
+        ----------
+        m : int
+            Which machine.
+        """
+        rows = self.known
+        u, emitter, outdoor = self.level[rows, m], self.emitter[rows, m], self.outdoor[rows]
+        found = features_of((u > IDLE).astype(float), u, outdoor, emitter)
+        running = u > IDLE
+        levels = np.unique(np.round(u[running] / SAME))
+        left_out = {
+            "standing": len(levels) < 2,
+            "command^2": len(levels) < 3,
+            "outdoor": running.sum() < 8 or np.std(outdoor[running]) < _TOLD,
+            "emitter": running.sum() < 8 or np.std(emitter[running]) < _TOLD,
+            "command^2 outdoor": len(levels) < 3 or np.std(outdoor[running]) < _TOLD,
+        }
+        return {name: values for name, values in found.items() if not left_out.get(name, False)}
+
+
+def _design(
+    loads: Loads, known: BoolArray, machines: Sequence[int], base: bool, standing: bool
+) -> tuple[FloatArray, list[tuple[int, str]]]:
+    """Columns of a regression, by machine and feature; a constant first, where something may be left."""
+    columns, owners = ([np.ones(int(known.sum()))], [(-1, "constant")]) if base else ([], [])
+    for m in machines:
+        for name, feature in loads.features(m).items():
+            column = feature[known[loads.known]]
+            if name != "standing" or (standing and not (base and column.all())):
+                columns.append(column)
+                owners.append((m, name))
+    return np.column_stack(columns), owners
+
+
+def design_of(loads: Loads, machines: Sequence[int], *, standing: bool = True) -> FloatArray:
+    """Columns of a regression, a constant first, shape (n_time, n_column); NaN where a load is unknown.
+
+    Parameters
+    ----------
+    loads : Loads
+        Of all machines.
+    machines : sequence of int
+        Which machines have a part in it.
+    standing : bool
+        Whether a machine may draw power at any load above 0.
+    """
+    columns, _ = _design(loads, loads.known, machines, True, standing)
+    design = np.full((len(loads.level), columns.shape[1]), np.nan)
+    design[loads.known] = columns
+    return design
+
+
+def left_out_error(design: FloatArray, values: FloatArray, per_day: int) -> float:
+    """Mean squared error of a regression on days that it has not seen [W2]: each fifth of the days is left out once.
+
+    Parameters
+    ----------
+    design : ndarray, shape (n_time, n_column)
+        Columns [their own]; rows that are not finite do not count.
+    values : ndarray, shape (n_time,)
+        Measured [W].
+    per_day : int
+        Steps of a day.
+    """
+    rows = np.flatnonzero(np.isfinite(values) & np.isfinite(design).all(axis=1))
+    fold, known, seen = (rows // per_day) % _FOLDS, design[rows], values[rows]
+    errors = np.empty(len(seen))
+    for k in range(_FOLDS):
+        out = fold == k
+        errors[out] = known[out] @ np.linalg.lstsq(known[~out], seen[~out])[0] - seen[out]
+    return float(np.mean(errors**2))
+
+
+def regress(
+    loads: Loads, values: FloatArray, machines: Sequence[int], *, base: bool = True, standing: bool = True
+) -> tuple[list[Curve], float]:
+    """Regress what is measured on the features of machines, a constant beside them.
+
+    Parameters
+    ----------
+    loads : Loads
+        Of all machines.
+    values : ndarray, shape (n_time,)
+        Measured [W].
+    machines : sequence of int
+        Which machines have a part in it.
+    base : bool
+        Whether something may be left when all machines are off; nothing tells that from the standing part of a machine
+        that never stops, which is then counted to it.
+    standing : bool
+        Whether a machine may draw power at any load above 0.
+
+    Returns
+    -------
+    list of Curve
+        One a machine.
+    float
+        The constant [W].
+
+    Raises
+    ------
+    PlantError
+        When there are too few steps with known loads.
+    """
+    rows = loads.known & np.isfinite(values)
+    design, owners = _design(loads, rows, machines, base, standing)
+    found, deviations = least_squares(design, values[rows])
+    curves = [curve_of([name if owner == m else "" for owner, name in owners], found, deviations) for m in machines]
+    return curves, float(found[0]) if base else 0.0
+
+
+def least_squares(design: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Coefficients and their standard errors, which bear autocorrelation, shape (n_column,) each [W over columns].
+
+    Parameters
+    ----------
+    design : ndarray, shape (n, n_column)
+        Columns [their own].
+    values : ndarray, shape (n,)
+        Measured [W].
+
+    Raises
+    ------
+    PlantError
+        When there are too few rows.
+    """
+    from statsmodels.regression.linear_model import OLS
+
+    rows, count = design.shape
+    PlantError.unless(
+        rows > 4 * count, "component maps", f"{4 * count} steps with known commands", rows,
+        "give more days, or telemetry whose commands are recorded",
+    )  # fmt: skip
+    found = OLS(values, design).fit(cov_type="HAC", cov_kwds={"maxlags": _LAGS})
+    with np.errstate(invalid="ignore"):  # of a feature that says next to nothing the variance may round below zero
+        return np.asarray(found.params), np.asarray(found.bse)
+
+
+def curve_of(names: Sequence[str], coefficients: FloatArray, deviations: FloatArray) -> Curve:
+    """Make a curve of the columns that have a name.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Feature of each column; empty of those that are not the curve's.
+    coefficients, deviations : ndarray, shape (n_column,)
+        And their standard errors [W].
+    """
+    told = [
+        {name: float(value) for name, value in zip(names, values, strict=True) if name}
+        for values in (coefficients, deviations)
+    ]
+    return Curve(*told)
