@@ -37,7 +37,7 @@ EXPERIMENT = 14
 #: Starts are those of the compressor, by its power.
 _COMPRESSOR = "heat_pump/electrical_power_sensor"
 _RUNS = 200.0  # W that a compressor draws when it runs; crankcase heaters draw 50
-_COLD = 0.01  # K below the band that count as time below it
+_COLD = 0.01  # K outside the band that count as time outside it
 
 #: Controllers by name, of a study and its plant.
 CONTROLLERS: dict[str, Callable[[PlantStudy, Any], Controller]] = {
@@ -189,14 +189,15 @@ def account(loop: ClosedLoopRun, scenario: Scenario, seconds: list[float]) -> di
     record = loop.record
     kpis = measure_kpis(record, scenario)
     parts = round(scenario.grid.step / record.step)
-    lower = np.repeat(scenario.lower, parts, axis=0)[: record.n_steps]
-    cold = (record.zone_temperature[1:] < lower - _COLD).sum(axis=0) * record.step / 3600.0
+    lower, upper = (np.repeat(edge, parts, axis=0)[: record.n_steps] for edge in (scenario.lower, scenario.upper))
+    zone, hours = record.zone_temperature[1:], record.step / 3600.0
+    cold, warm = ((by > _COLD).sum(axis=0).mean() * hours for by in (lower - zone, zone - upper))
     days = kpis.hours / 24.0
     return {
         "cost": kpis.cost_tot, "energy": kpis.ener_tot, "discomfort": kpis.tdis_tot,
         "below": float(np.mean([z.below for z in kpis.zones])), "above": float(np.mean([z.above for z in kpis.zones])),
         "zones": {z.zone: {"below": z.below, "above": z.above, "largest_below": z.largest_below} for z in kpis.zones},
-        "hours_below": float(cold.mean()), "starts_a_day": _starts(loop.measurements, days),
+        "hours_below": float(cold), "hours_above": float(warm), "starts_a_day": _starts(loop.measurements, days),
         "cpu_seconds": float(np.sum(seconds)), "days": days,
     }  # fmt: skip
 

@@ -92,10 +92,11 @@ def table_of(runs: list[dict[str, Any]]) -> str:
         if "failure" in row:
             rows.append((*head, f"failed: {row['failure']}", *[""] * (len(COLUMNS) - 4)))
             continue
+        hours = row["hours_above" if PLANTS[row["plant"]].cooled else "hours_below"]
         base, starts = own.get((row["plant"], row["period"]), math.nan), row["starts_a_day"]
         rows.append((
             *head, f"{row['cost']:.3f}", f"{100.0 * (row['cost'] / base - 1.0):+.1f}", f"{row['below']:.2f}",
-            f"{row['above']:.2f}", f"{row['hours_below']:.1f}", "-" if starts is None else f"{starts:.1f}",
+            f"{row['above']:.2f}", f"{hours:.1f}", "-" if starts is None else f"{starts:.1f}",
             f"{row['cpu_seconds']:.0f}" if row["cpu_seconds"] >= 10.0 else f"{row['cpu_seconds']:.1f}",
         ))  # fmt: skip
     return markdown(COLUMNS, rows)

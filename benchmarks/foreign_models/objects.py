@@ -289,7 +289,8 @@ def summed(title: str, terms: Mapping[str, tuple[str, str, float]]) -> Objects:
     parts = {f"{name}_{term}": (key, variable) for term, (key, variable, _) in terms.items()}
     total = " + ".join(f"{factor:g} * {name}_{term}" for term, (_, _, factor) in terms.items())
     found = sensors(parts)
-    merge(found, program(f"{name}_sum", f"SET {name} = {total}", "EndOfSystemTimestepAfterHVACReporting"))
+    # before reporting: after it, the sum would be told a step late
+    merge(found, program(f"{name}_sum", f"SET {name} = {total}", "EndOfSystemTimestepBeforeHVACReporting"))
     merge(found, {
         "EnergyManagementSystem:GlobalVariable": {f"{name} variable": {"variables": [{"erl_variable_name": name}]}},
         "EnergyManagementSystem:OutputVariable": {title: {

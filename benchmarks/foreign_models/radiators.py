@@ -24,11 +24,11 @@ _COOL = 17.0  # degC, of the thermostats' own clocks
 _RADIANT = 0.3  # of a radiator's heat [-], usual of panels with convectors (EN 442)
 _MEAN_WATER = 55.0  # degC, at which the radiators are rated: 60 to 50
 _SPREAD = 1.0 / (4180.0 * 10.0)  # kg/s of water per W: 10 K
-_PARASITIC = 40.0  # W, fan and electronics of the boiler while it runs
-_PUMP = 45.0  # W
+_PARASITIC = 40.0  # W, fan and electronics of the boiler at full load
+_PUMP, _IDLE = 45.0, 0.3  # W at full flow, and the share that it draws at none
 #: Efficiency, of the gross calorific value, with water that returns at 50 degC, and what a kelvin less adds while
 #: vapour condenses: about 0.97 at 30 degC, as makers say of condensing boilers.
-_EFFICIENCY, _PER_KELVIN, _RETURN = 0.88, 0.0045, (25.0, 55.0)
+_EFFICIENCY, _PER_KELVIN, _RETURN = 0.88, 0.0045, (25.0, 60.0)
 _DAY, _NIGHT = [7 <= hour < 23 for hour in range(24)], [hour < 8 or hour >= 22 for hour in range(24)]
 ALL_DAY = [True] * 24
 _RADIATOR = "ZoneHVAC:Baseboard:RadiantConvective:Water"
@@ -90,11 +90,14 @@ def dwelling(of: Dwelling | None = None) -> Objects:
         "heating_design_capacity_method": "HeatingDesignCapacity", "fraction_radiant": _RADIANT,
         "fraction_of_radiant_energy_incident_on_people": 0.0,
     }}})  # fmt: skip
-    pump = {"design_flow_rate": flow * len(listed), "design_pump_head": 20_000.0, "motor_efficiency": 0.5,
-            "design_power_consumption": _PUMP, "pump_control_type": "Intermittent"}  # fmt: skip
+    pump = {"design_maximum_flow_rate": flow * len(listed), "design_pump_head": 20_000.0, "motor_efficiency": 0.5,
+            "design_power_consumption": _PUMP, "pump_control_type": "Intermittent",
+            "coefficient_1_of_the_part_load_performance_curve": _IDLE,
+            "coefficient_2_of_the_part_load_performance_curve": 1.0 - _IDLE}  # fmt: skip
     consumers = [(_RADIATOR, f"{zone} radiator") for zone in listed]
     machine = ("Boiler:HotWater", BOILER)
-    ep.merge(model, scheduled_loop("HOT LOOP", pump, machine, consumers, "Heating", flow * len(listed), 50.0))
+    ep.merge(model, scheduled_loop("HOT LOOP", pump, machine, consumers, "Heating", flow * len(listed), 50.0,
+                                   variable=True))  # fmt: skip
     ep.merge(model, _boiler(of.boiler, flow * len(listed)))
     ep.merge(model, supply_water("HOT LOOP", RESET))
     return model
@@ -131,7 +134,7 @@ def _boiler(capacity: float, flow: float) -> Objects:
             "efficiency_curve_temperature_evaluation_variable": "EnteringBoiler",
             "normalized_boiler_efficiency_curve_name": "condensing", "design_water_flow_rate": flow,
             "boiler_water_inlet_node_name": f"{BOILER} in", "boiler_water_outlet_node_name": f"{BOILER} out",
-            "water_outlet_upper_temperature_limit": 85.0, "boiler_flow_mode": "ConstantFlow",
+            "water_outlet_upper_temperature_limit": 85.0, "boiler_flow_mode": "NotModulated",
             "on_cycle_parasitic_electric_load": _PARASITIC,
         }},
         "Curve:Biquadratic": {"condensing": curve},

@@ -37,7 +37,7 @@ class Shop:
     people, appliances : float
         Customers and staff, and heat of lights and tills that nothing measures [W].
     capacity, resistance : float
-        Of the compressor at 8.3 degC outdoors, and of what is let in below `_LET_IN` [W].
+        Of the compressor, heating at 8.3 degC outdoors and cooling at 35, and of what is let in below `_LET_IN` [W].
     cooled : bool
         Whether it is looked at in summer: cooled to 24 degC while it is open, and its cooling is measured and told.
     opens : tuple of int

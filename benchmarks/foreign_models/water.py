@@ -21,7 +21,7 @@ ENDIF
 
 def water_loop(
     name: str, pump: dict[str, Any], machine: tuple[str, str], consumers: Sequence[tuple[str, str]],
-    scheme: tuple[str, str], flow: float,
+    scheme: tuple[str, str], flow: float, *, variable: bool = False,
 ) -> Objects:  # fmt: skip
     """Return the loop; the machine's and consumers' nodes are called ``NAME in`` and ``NAME out``.
 
@@ -30,7 +30,7 @@ def water_loop(
     name : str
         Of the loop.
     pump : dict
-        Fields of a ``Pump:ConstantSpeed`` beside its nodes.
+        Fields of a pump beside its nodes.
     machine : tuple of str
         Class and name.
     consumers : sequence of tuple of str
@@ -39,8 +39,11 @@ def water_loop(
         Class and name of the operation scheme.
     flow : float
         Largest flow [m3/s].
+    variable : bool
+        Whether the pump gives what consumers let through: ``Pump:VariableSpeed`` rather than ``Pump:ConstantSpeed``.
     """
-    found: Objects = {"Pump:ConstantSpeed": {
+    kind = f"Pump:{'Variable' if variable else 'Constant'}Speed"
+    found: Objects = {kind: {
         f"{name} pump": {**pump, "inlet_node_name": f"{name} supply in", "outlet_node_name": f"{name} pump out"}
     }}  # fmt: skip
 
@@ -71,7 +74,7 @@ def water_loop(
             "branches": [{"inlet_branch_name": each} for each in parallel],
         }
 
-    first = branch(f"{name} pump", "Pump:ConstantSpeed", f"{name} pump", (f"{name} supply in", f"{name} pump out"))
+    first = branch(f"{name} pump", kind, f"{name} pump", (f"{name} supply in", f"{name} pump out"))
     side(f"{name} supply", first, [branch(machine[1], *machine, (f"{machine[1]} in", f"{machine[1]} out"))],
          pipe(f"{name} supply pipe", f"{name} supply pipe in", f"{name} supply out"))  # fmt: skip
     taking = [branch(what, kind, what, (f"{what} in", f"{what} out")) for kind, what in consumers]
@@ -99,13 +102,13 @@ def water_loop(
 
 def scheduled_loop(
     name: str, pump: dict[str, Any], machine: tuple[str, str], consumers: Sequence[tuple[str, str]], kind: str,
-    flow: float, water: float,
+    flow: float, water: float, *, variable: bool = False,
 ) -> Objects:  # fmt: skip
     """Return the loop of a machine that runs as consumers ask, to a temperature of the schedule ``NAME water``.
 
     Parameters
     ----------
-    name, pump, machine, consumers, flow
+    name, pump, machine, consumers, flow, variable
         As of `water_loop`.
     kind : str
         ``Heating`` or ``Cooling``.
@@ -113,7 +116,7 @@ def scheduled_loop(
         Temperature unless something else says it [degC].
     """
     scheme = f"PlantEquipmentOperation:{kind}Load"
-    found = water_loop(name, pump, machine, consumers, (scheme, f"{name} load"), flow)
+    found = water_loop(name, pump, machine, consumers, (scheme, f"{name} load"), flow, variable=variable)
     ep.merge(found, {
         scheme: {f"{name} load": {
             "load_range_1_lower_limit": 0.0, "load_range_1_upper_limit": 1e9,

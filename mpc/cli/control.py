@@ -48,7 +48,11 @@ class StudyOptions:
     at: Annotated[str | None, value("Unit or server in the place of that of a plant.yaml.", "FILE|URL")] = None
     violations: Annotated[
         str,
-        value("Share of occupied steps below the band that is kept, such as 5%, or none; of a plant.yaml.", "P"),
+        value(
+            "Share of occupied steps below the band, where it cools above it, that is kept, such as 5%, or none; "
+            "of a plant.yaml.",
+            "P",
+        ),
     ] = "1%"
     starts: Annotated[int, value("Most starts of a machine in 24 hours; of a plant.yaml.")] = 10
     runs: Annotated[

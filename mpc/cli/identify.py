@@ -33,7 +33,7 @@ def identify(
         str, options.value("What is controlled; default: commands of machines, else setpoints of zones.", "NAME,...")
     ] = "",
     cooling: Annotated[
-        bool, options.switch("--cooling", "Control setpoints of cooling; those of heating are left to the plant.")
+        bool, options.switch("--cooling", "Control setpoints of cooling; beside them those of heating, kept clear of.")
     ] = False,
     at: Annotated[str | None, options.value("Unit or server in the place of the description's.", "FILE|URL")] = None,
     seed: Annotated[int, options.value("Seed of the excitation.")] = 0,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mpc.identify.machines import Machine
+from mpc.identify.machines import Machine, as_heated
 from mpc.loop.plant import Measurements
 from mpc.scenario.forecast import Forecast
 from thermal.case.points import ZONE_TEMPERATURE
@@ -49,9 +49,9 @@ class Excitation:
 
     A pseudo-random sequence (Ljung 1999, System Identification, ch. 13.3) of levels rather than of two values, as maps
     are to be told from it too: off, full load and, where the actuator takes them, loads in between; setpoints anywhere
-    within the band of their zone, those of cooling in its upper half where that of heating cannot be told. Once a zone
-    of a machine is nearer to an edge of its band than the guard, on the side that the machine drives it to, the plant's
-    own control has the machine.
+    within the band of their zone, clear of the zone's other setpoint (`Machine.farthest`). Once a zone of a machine is
+    nearer to an edge of its band than the guard, on the side that the machine drives it to, the plant's own control has
+    the machine.
 
     Parameters
     ----------
@@ -95,13 +95,21 @@ class Excitation:
                 self._value[machine.name] = np.nan
                 continue
             if k >= self._until[machine.name]:
-                self._draw(machine, place, k)
+                self._draw(machine, place, k, measurements)
             value = self._value[machine.name]
             if machine.role == "setpoint":
-                chosen |= machine.told(value, place[3] if machine.sign > 0.0 else place[2])
+                chosen |= machine.told(value, self._other_edge(machine, forecast))
             else:
                 chosen[machine.name] = value
         return chosen
+
+    def _other_edge(self, machine: Machine, forecast: Forecast | None) -> float:
+        """Edge of the coming two steps that a machine drives its zones away from [K]; far off without a forecast."""
+        if forecast is None:
+            return machine.sign * np.inf
+        side = "upper" if machine.sign > 0.0 else "lower"
+        edges = forecast.table[[f"{zone}/comfort_{side}_temperature" for zone in machine.serves]].iloc[:2].to_numpy()
+        return float(machine.sign * (machine.sign * edges).min())
 
     def _place(
         self, machine: Machine, measurements: Measurements, forecast: Forecast | None
@@ -130,17 +138,20 @@ class Excitation:
         cold, warm = self.settings.guard
         return place[1] < warm if full else place[0] < cold
 
-    def _draw(self, machine: Machine, place: tuple[float, float, float, float], k: int) -> None:
+    def _draw(
+        self, machine: Machine, place: tuple[float, float, float, float], k: int, measurements: Measurements
+    ) -> None:
         """Draw a level and how long it is held."""
         random, actuator = self._random, machine.actuator
         shortest, longest = (max(round(s / self.step_seconds), 1) for s in self.settings.hold)
         self._until[machine.name] = k + int(random.integers(shortest, longest + 1))
         low, high = actuator.lowest, actuator.highest
         if machine.role == "setpoint":
-            lower, upper = place[2] + self.settings.guard[0], place[3] - self.settings.guard[0]
-            if machine.sign < 0.0 and machine.beside is None:  # above the setpoint of heating, which the plant has
-                lower = 0.5 * (lower + upper)
-            value = random.uniform(min(lower, upper), max(lower, upper))
+            edges = place[2:] if machine.sign > 0.0 else place[:1:-1]
+            near, far = (as_heated(edge, machine.sign) for edge in edges)
+            far = machine.farthest(near, far, measurements) - self.settings.guard[0]
+            near += self.settings.guard[0]
+            value = as_heated(random.uniform(min(near, far), max(near, far)), machine.sign)
             self._value[machine.name] = float(np.clip(value, low, high))
             return
         room = max(place[0] + place[1] - self.settings.guard[1], 0.1)

@@ -78,6 +78,7 @@ def identify(telemetry: PlantTelemetry, machines: Sequence[Machine], progress: P
     """
     days = len(telemetry.frame) * telemetry.step / 86_400.0
     PlantError.unless(days >= _FEWEST, "identify", f"{_FEWEST:g} days of telemetry at least", f"{days:.3g}")
+    machines = [_measured(machine, telemetry) for machine in machines]
     data = _data(telemetry, machines)
     suns = tuple(telemetry.suns)
     serves = {machine.name: machine.serves for machine in machines}
@@ -108,6 +109,17 @@ def identify(telemetry: PlantTelemetry, machines: Sequence[Machine], progress: P
     shared = pairs_as_heated(held_back, sign)
     model = PlantModel(telemetry.site.name, telemetry.step, box, maps, base | left, shared, source)
     return Identified(model, telemetry, data, loads, tuple(errors), split, notes)
+
+
+def _measured(machine: Machine, telemetry: PlantTelemetry) -> Machine:
+    """Leave out a sensor of heat that a machine which cools does not move: it is that of what heats the zone."""
+    if machine.sign > 0.0 or not machine.heat or telemetry.column(machine.heat).min() < -1.0:
+        return machine
+    PlantError.unless(
+        machine.power, f"telemetry: {machine.heat}", "negative heat while the zone is cooled", "none below -1 W",
+        "measure what its cooling takes, or name the cooling's power in `measurements`",
+    )  # fmt: skip
+    return replace(machine, heat="")
 
 
 def _data(telemetry: PlantTelemetry, machines: Sequence[Machine]) -> GreyBoxData:

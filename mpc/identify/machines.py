@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -109,9 +109,10 @@ class Machine:
         return -1.0 if self.name.rpartition("/")[2] == COOLING_SETPOINT else 1.0
 
     def told(self, value: float, other: float) -> dict[str, float]:
-        """Give what is told where a setpoint is: beside it the zone's other one, so that the two never cross.
+        """Give what is told where a setpoint is: beside it the zone's other one, a kelvin from it at least.
 
-        That is at its own edge of the band, or a kelvin from the setpoint where that is farther from it.
+        That is at its own edge of the band, or farther from the setpoint, within its range; where that range ends
+        first the setpoint gives way.
 
         Parameters
         ----------
@@ -127,12 +128,46 @@ class Machine:
         >>> [*Machine(cooling, "setpoint", ("room",), beside=heating).told(293.5, 293.15).values()]
         [293.5, 292.5]
         """
-        values = {self.name: float(np.clip(value, self.actuator.lowest, self.actuator.highest))}
+        beside = {}
         if self.beside is not None:
-            apart = values[self.name] + self.sign * _APART
-            beside = max(other, apart) if self.sign > 0.0 else min(other, apart)
-            values[self.beside.name] = float(np.clip(beside, self.beside.lowest, self.beside.highest))
-        return values
+            farther, nearer = (max, min) if self.sign > 0.0 else (min, max)
+            apart = farther(other, value + self.sign * _APART)
+            apart = float(np.clip(apart, self.beside.lowest, self.beside.highest))
+            beside, value = {self.beside.name: apart}, nearer(value, apart - self.sign * _APART)
+        return {self.name: float(np.clip(value, self.actuator.lowest, self.actuator.highest))} | beside
+
+    def farthest(self, near: float, far: float, measurements: Mapping[str, float]) -> float:
+        """Give the temperature that a setpoint is never told beyond, as `as_heated` [K].
+
+        It is the other edge of the band. Where the zone's other setpoint cannot be told beside it, the plant's own is
+        kept clear of, as it is measured; where that is not measured either, a setpoint of cooling stays in its own half
+        of the band.
+
+        Parameters
+        ----------
+        near, far : float
+            Edges of the band as `as_heated`: that which the machine keeps the zone from, and the other [K].
+        measurements : mapping of str to float
+            Of the last step [K].
+        """
+        if self.beside is not None:
+            return far
+        point = HEATING_SETPOINT if self.sign < 0.0 else COOLING_SETPOINT
+        other = f"{self.name.rpartition('/')[0]}/{point}"
+        if other in measurements and np.isfinite(measurements[other]):
+            return float(min(far, as_heated(measurements[other], self.sign) - _APART))
+        return far if self.sign > 0.0 else 0.5 * (near + far)
+
+    def bound(self, actuators: Mapping[str, Actuator]) -> Machine:
+        """Give it the actuators of a plant, whose ranges may be narrower than where it was identified.
+
+        Parameters
+        ----------
+        actuators : mapping of str to Actuator
+            Of the plant, by name; its own among them.
+        """
+        beside = None if self.beside is None else actuators.get(self.beside.name)
+        return replace(self, actuator=actuators[self.name], beside=beside)
 
     def signal(self, telemetry: PlantTelemetry) -> FloatArray:
         """Heat that it gives, or takes where it cools, or what is bought in its place, shape (n_time,) [W].
@@ -248,7 +283,8 @@ def find_machines(
         expected = f"a command of a machine, or a {HEATING_SETPOINT}"
     PlantError.unless(chosen, "actuators", expected, ", ".join(by_name) or "none")
     cools = [name for name in chosen if name in setpoints[COOLING_SETPOINT]]
-    PlantError.unless(len(cools) in (0, len(chosen)), "actuators", "machines that all heat, or all cool", chosen)
+    expected = "setpoints of cooling alone" if cooling else "machines that all heat, or all cool"
+    PlantError.unless(len(cools) in (len(chosen), 0 if not cooling else -1), "actuators", expected, ", ".join(chosen))
     heats = [c for c in columns if c.rpartition("/")[2] == HEATING_POWER]
     made = []
     for name in chosen:

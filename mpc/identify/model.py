@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
@@ -65,6 +65,17 @@ class PlantModel:
     def sign(self) -> float:
         """Of the heat that its machines give: 1 where they heat, -1 where they cool [-]."""
         return self.maps[0].machine.sign if self.maps else 1.0
+
+    def bound(self, actuators: Iterable[Actuator]) -> Self:
+        """Give its machines the actuators of a plant, see `Machine.bound`.
+
+        Parameters
+        ----------
+        actuators : iterable of Actuator
+            Of the plant, those of the model among them.
+        """
+        by_name = {a.name: a for a in actuators}
+        return replace(self, maps=tuple(replace(m, machine=m.machine.bound(by_name)) for m in self.maps))
 
     @property
     def led_heat(self) -> FloatArray:

@@ -55,11 +55,14 @@ def site_controller(site: Site) -> Controller:
     """
     actuators = site_actuators(site)
     entry = site.file.model
-    if site.file.controller == "full_speed" or entry is None:
-        return FullSpeed(find_machines(actuators, tuple(site.file.points), tuple(site.plant.zones)))
-    if isinstance(entry, BuildingModel):
+    by_rule = site.file.controller == "full_speed"
+    if isinstance(entry, BuildingModel) and not by_rule:
         return building_controller(site, entry, actuators)
+    if entry is None or isinstance(entry, BuildingModel):
+        return FullSpeed(find_machines(actuators, tuple(site.file.points), tuple(site.plant.zones)))
     model = read_model(site.path.parent / entry)
+    if by_rule:
+        return FullSpeed(tuple(found.machine for found in model.bound(actuators).maps))
     LiveError.unless(
         abs(model.step - site.step) < 1e-6, f"{site.path.name}: model", f"steps of {site.step:g} s, those of the plant",
         f"{model.step:g} s", "identify the plant anew",

@@ -181,7 +181,7 @@ def identify_means(found: Identified) -> Means:
     found : Identified
         Of `identify`.
     """
-    answer = f"The library has learnt how {found.model.name} warms up and what its machines draw, from "
+    answer = f"The library has learnt how {found.model.name} warms up and cools down and what its machines draw, from "
     answer += f"{duration(len(found.telemetry.frame) * found.telemetry.step)} of telemetry."
     if not found.errors:
         trust = "Nothing is known of its errors: the telemetry was too short to hold days out."

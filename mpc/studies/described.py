@@ -145,7 +145,7 @@ class PlantStudy:
             Of this study.
         """
         if self.model is not None:
-            return tuple(found.machine for found in self.model.maps)
+            return tuple(found.machine for found in self.model.bound(plant.actuators).maps)
         return self._found(plant.actuators, plant.columns, plant.zone_names)
 
     def _found(self, actuators: Iterable[Actuator], columns: Any, zones: Any) -> tuple[Machine, ...]:

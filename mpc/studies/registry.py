@@ -222,7 +222,8 @@ def _own(study: PlantStudy, plant: Any) -> Controller:
 @register_controller(
     "full_speed", title="full speed with lead", subject="plant",
     about="Machines run at full speed from the lower edge of the comfort band to half a kelvin above it, and not at "
-    "all otherwise; the edge is the highest of the next three hours, so that zones are set back in between.",
+    "all otherwise; the edge is the highest of the next three hours, so that zones are set back in between. Setpoints, "
+    "of cooling too, are at that edge.",
 )  # fmt: skip
 def _full_speed(study: PlantStudy, plant: Any) -> Controller:
     return study.full_speed(plant)

@@ -43,8 +43,8 @@ def models(package: Callable[[str], ModuleType]) -> Callable[[str], ModuleType]:
 def made(models: Callable[[str], ModuleType], tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Any]:
     folder = tmp_path_factory.mktemp("plants")
 
-    def run(name: str, controller: Any, steps: int) -> pd.DataFrame:
-        path, short = folder / name / "plant.yaml", {"start": "2023-01-09", "days": 2, "warm_up_days": 1}
+    def run(name: str, controller: Any, steps: int, start: str = "2023-01-09") -> pd.DataFrame:
+        path, short = folder / name / "plant.yaml", {"start": start, "days": 2, "warm_up_days": 1}
         if not path.exists():
             models("plants").write_plant(name, folder)
         with load_plant(path, changes={"period": short}) as plant:
@@ -78,6 +78,31 @@ def test_curves_of_a_heat_pump_follow_their_law(models: Callable[[str], ModuleTy
     constant, factor, exponent = machine.part_load()
     powers = [load * (constant + factor * load**exponent) for load in (0.5, 1.0)]
     assert powers == pytest.approx([0.3 + 0.7 * 0.5, 1.0])
+
+
+def test_curves_of_a_chiller_follow_their_law(models: Callable[[str], ModuleType]) -> None:
+    machine = models("heat_pump").Chiller(capacity=40_000.0, cop=3.2, standing=0.2)
+    capacity, per_heat = machine.curves().values()
+
+    def at(curve: np.ndarray, water: float, air: float) -> float:
+        return float(curve @ [1.0, water, water**2, air, air**2, water * air])
+
+    assert at(capacity, 9.0, 25.0) == pytest.approx(1.0 + 0.03 * 2.0 + 0.009 * 10.0)
+    # Carnot between 5 K above the air and 5 K below the water: 28 K over 275.15 K, beside 38 K over 275.15 K
+    assert at(per_heat, 7.0, 25.0) == pytest.approx(28.0 / 38.0, rel=0.01) and at(per_heat, 7.0, 35.0) == pytest.approx(
+        1.0, rel=0.01
+    )
+
+
+def test_rooms_lie_side_by_side(models: Callable[[str], ModuleType]) -> None:
+    rooms = models("rooms").Rooms(3, 2, 5.0, 4.0, 3.0, (3.0, 2.0))
+    assert rooms.names == ("SOUTHWEST", "SOUTHMIDDLE", "SOUTHEAST", "NORTHWEST", "NORTHMIDDLE", "NORTHEAST")
+    assert rooms.outer == (3.0 * (6 * 5.0 + 4 * 4.0), 6 * 3.0 + 4 * 2.0) and rooms.area == 20.0
+    middle = rooms.box(4, rooms.names)
+    behind = {name: face.get("outside_boundary_condition_object") for name, face in
+              middle["BuildingSurface:Detailed"].items()}  # fmt: skip
+    assert behind["NORTHMIDDLE south"] == "SOUTHMIDDLE north" and behind["NORTHMIDDLE east"] == "NORTHEAST west"
+    assert list(middle["Window"]) == ["NORTHMIDDLE north window"] and behind["NORTHMIDDLE north"] is None
 
 
 def test_prices_are_drawn_from_their_seed(models: Callable[[str], ModuleType]) -> None:
@@ -174,6 +199,47 @@ def test_every_setpoint_reaches_its_heater(made: Callable[..., Any], name: str) 
         assert acted[room].iloc[-1] > with_own[room].iloc[-1] + 0.5
     heats = [column for column in with_own if column.endswith(HEATING_POWER)]
     assert (acted[heats].iloc[5] > with_own[heats].iloc[5] + 500.0).all()
+
+
+@pytest.mark.long
+@needs_energyplus
+@pytest.mark.parametrize(("name", "zones"), [("cooled_shop", 1), ("cooled_office", 4)])
+def test_every_setpoint_of_cooling_reaches_its_machine(made: Callable[..., Any], name: str, zones: int) -> None:
+    with_own = made(name, Held({}), 60, "2023-07-10")
+    setpoints = [column for column in with_own if column.endswith("zone_air_cooling_temperature_setpoint")]
+    assert len(setpoints) == zones
+    told = {column: 295.15 for column in setpoints}
+    told |= {column.replace("cooling", "heating"): 291.15 for column in setpoints}
+    acted = made(name, Held({52: told}), 60, "2023-07-10")
+    np.testing.assert_allclose(acted.iloc[:52], with_own.iloc[:52], rtol=1e-6, atol=1e-6)
+    heats = [
+        column for column in with_own if column.endswith(HEATING_POWER) and (zones == 1 or "heat_pump" not in column)
+    ]
+    assert (acted[heats].iloc[53] < with_own[heats].iloc[53] - 500.0).all() and (
+        with_own[heats].iloc[:8] == 0.0
+    ).all().all()
+    for column in setpoints:
+        room = f"{column.rpartition('/')[0]}/{ZONE_TEMPERATURE}"
+        assert with_own[room].iloc[50] == pytest.approx(297.15, abs=0.05)  # its own clock holds 24 degC
+        assert acted[room].iloc[-1] < with_own[room].iloc[-1] - 1.0
+
+
+@pytest.mark.long
+@needs_energyplus
+def test_gas_of_a_dwelling_is_what_its_radiators_give_over_the_efficiency(
+    made: Callable[..., Any], models: Callable[[str], ModuleType]
+) -> None:
+    seen = made("drawn_14", Held({}), 96)
+    radiators = sum(seen[f"{room}/{HEATING_POWER}"] for room in ("south", "north"))
+    heat, gas, pump = (seen[c] for c in ("boiler/heating_power_sensor", "boiler/gas_power_sensor",
+                                         "hot_water/pump_power_sensor"))  # fmt: skip
+    friction = radiators.sum() - heat.sum()
+    assert heat.sum() > 96 * 500.0 and 0.0 < friction < pump.sum()  # the pump's friction is in the water, no more
+    steady = heat > 1500.0
+    returned = seen["boiler/return_water_temperature_sensor"][steady] - 273.15
+    law = 0.88 + 0.0045 * (50.0 - returned)
+    assert steady.sum() > 10 and law.max() - law.min() > 0.01
+    np.testing.assert_allclose((heat / gas)[steady], law, rtol=0.02)
 
 
 def prepared(script: Callable[[str], ModuleType], models: Callable[[str], ModuleType]) -> tuple[ModuleType, ModuleType]:

@@ -142,6 +142,7 @@ class IdentifiedController:
     ) -> None:
         battery = [electric.command] if electric is not None and electric.command else []
         need_actuator("mpc", [m.machine.name for m in model.maps] + battery, actuators, every=True)
+        model = model.bound(actuators)
         self.model, self.settings, self._location = model, settings or IdentifiedSettings(), location
         self._actuators = {a.name: a for a in actuators}
         self._problem, self._observer = IdentifiedProblem(model, electric), GreyBoxObserver(model)
@@ -209,7 +210,7 @@ class IdentifiedController:
         for runs in self._runs:
             runs.note(float(levels[runs.machine]))
         self._before, self._plan = (ahead, levels), solution
-        values = self._values(levels, solution, ahead)
+        values = self._values(levels, solution, ahead, measurements)
         if whole is not None:
             values |= self._problem.command(whole)
         if self._meter is not None:
@@ -348,7 +349,9 @@ class IdentifiedController:
         inside = self._inside(measurements, ahead)
         return np.array([float((inside < self._kept[0])[mine].any()) for mine in self.model.box.serves])
 
-    def _values(self, levels: FloatArray, solution: StageSolution | None, ahead: Ahead) -> dict[str, float]:
+    def _values(
+        self, levels: FloatArray, solution: StageSolution | None, ahead: Ahead, measurements: Measurements
+    ) -> dict[str, float]:
         """Values of the actuators for levels."""
         planned = self._observer.state[None] if solution is None else solution.states[1:]
         zone = planned[:, : len(self.model.box.zones)] + REFERENCE
@@ -357,18 +360,19 @@ class IdentifiedController:
         for k, found in enumerate(self.model.maps):
             level = float(levels[k])
             if found.operation == "setpoint":
-                edges = self._edges_of(k, ahead)
+                edges = self._edges_of(k, ahead, measurements)
                 values |= found.machine.told(self._thermostats.tell(k, level, most[k], zone, edges, shared), edges[1])
             else:
                 values[found.machine.name] = self._command(found, level)
         return values
 
-    def _edges_of(self, k: int, ahead: Ahead) -> tuple[float, float]:
-        """Edges of a machine's zones: that which it keeps them from, with the distance, and the other [K]."""
+    def _edges_of(self, k: int, ahead: Ahead, measurements: Measurements) -> tuple[float, float]:
+        """Edges of a machine's zones: that which it keeps them from, with the distance, and where it stops [K]."""
         served, sign = self.model.box.serves[k], self.model.sign
         near, far = ahead.edges(sign)
         kept, other = float((near[0] + self._kept[0])[served].max()), float(far[:2, served].min())
-        return as_heated(kept, sign), as_heated(other, sign)
+        stops = self.model.maps[k].machine.farthest(kept, other, measurements)
+        return as_heated(kept, sign), as_heated(stops, sign)
 
     def _command(self, found: MachineMap, level: float) -> float:
         """Value of a machine's actuator for a level."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import astuple, replace
 
 import numpy as np
 import pandas as pd
@@ -12,13 +12,15 @@ import pytest
 from calibration.estimation.state_space import REFERENCE
 from calibration.grey_box.network import GreyBox
 from mpc.baselines.plants import FullSpeed
+from mpc.control.identified.beyond import PowerLearner
 from mpc.control.identified.controller import IdentifiedController
+from mpc.control.identified.electric import Electric
 from mpc.errors import PlantError
 from mpc.identify.curves import Curve
 from mpc.identify.excitation import Excitation, ExcitationSettings
 from mpc.identify.identify import identify
 from mpc.identify.machines import Machine, as_heated, find_machines
-from mpc.identify.maps import MachineMap
+from mpc.identify.maps import MachineMap, OwnPower
 from mpc.identify.model import PlantModel
 from mpc.identify.telemetry import SET, PlantTelemetry, Site
 from mpc.loop.actuators import COOLING_SETPOINT, HEATING_SETPOINT, Actuator
@@ -28,7 +30,7 @@ from thermal._types import FloatArray
 from thermal.case.building import Location
 from thermal.case.points import HEATING_POWER, OUTDOOR_TEMPERATURE, ZONE_TEMPERATURE
 
-ROOMS, STEP = ("south", "north"), 900.0
+ROOMS, STEP, POWER = ("south", "north"), 900.0, "electrical_power_sensor"
 PLACE = Location(latitude=50.8, longitude=4.35, elevation=100.0, timezone="Etc/GMT-1")
 POINTS = {1.0: HEATING_SETPOINT, -1.0: COOLING_SETPOINT}
 BANDS = {1.0: ("lower", "upper"), -1.0: ("upper", "lower")}
@@ -38,8 +40,11 @@ def setpoint_of(room: str, sign: float) -> str:
     return f"{room}/{POINTS[sign]}"
 
 
-def machine_of(room: str, sign: float) -> Machine:
-    return Machine(Actuator(setpoint_of(room, sign), "K", 280.0, 306.0), "setpoint", (room,), f"{room}/{HEATING_POWER}")
+def machine_of(room: str, sign: float, *, more: bool = False) -> Machine:
+    """A setpoint with measured heat; with `more` power of its own, and the zone's other setpoint beside it."""
+    own, other = (Actuator(setpoint_of(room, s), "K", 280.0, 306.3) for s in (sign, -sign))
+    found = Machine(own, "setpoint", (room,), f"{room}/{HEATING_POWER}")
+    return replace(found, power=f"{room}/{POWER}", beside=other) if more else found
 
 
 def model_of(sign: float, shared: tuple[tuple[float, float], ...] = ()) -> PlantModel:
@@ -47,7 +52,7 @@ def model_of(sign: float, shared: tuple[tuple[float, float], ...] = ()) -> Plant
     heat, box = Curve({"command": 4000.0}, {}), {room: 40.0 for room in ROOMS}
     limits = tuple(sorted((as_heated(outdoor, sign), load) for outdoor, load in ((270.0, 0.9), (278.0, 1.0))))
     maps = tuple(
-        MachineMap(machine_of(room, sign), "setpoint", heat, {"electricity": Curve({"command": 1500.0}, {})},
+        MachineMap(machine_of(room, sign, more=True), "setpoint", heat, {"electricity": Curve({"command": 1500.0}, {})},
                    (-0.1, 0.3), limits)
         for room in ROOMS
     )  # fmt: skip
@@ -69,20 +74,25 @@ def forecast_of(sign: float, outdoor: FloatArray, begin: str = "2023-01-09 05:15
 
 
 def seen_of(sign: float, second: int, zones: FloatArray, heats: FloatArray, outdoor: float) -> Measurements:
-    names = [f"{room}/{ZONE_TEMPERATURE}" for room in ROOMS] + [f"{room}/{HEATING_POWER}" for room in ROOMS]
+    names = [f"{room}/{point}" for point in (ZONE_TEMPERATURE, HEATING_POWER, POWER) for room in ROOMS]
     layout = PointLayout((*names, f"weather_station/{OUTDOOR_TEMPERATURE}"), "Etc/GMT-1")
-    return Measurements(layout, second, [*as_heated(zones, sign), *(sign * heats), as_heated(outdoor, sign)])
+    return Measurements(
+        layout, second, [*as_heated(zones, sign), *(sign * heats), *(20.0 + 0.5 * heats), as_heated(outdoor, sign)]
+    )
 
 
-def test_a_controller_that_cools_does_what_one_that_heats_does_in_the_mirror() -> None:
+@pytest.mark.parametrize("electric", [None, Electric(demand=2.0)])
+def test_a_controller_that_cools_does_what_one_that_heats_does_in_the_mirror(electric: Electric | None) -> None:
     rng = np.random.default_rng(3)
     outdoor = 273.0 + 5.0 * np.sin(np.arange(80) / 12.0)
     zones = 293.0 + np.cumsum(rng.normal(0.0, 0.25, (20, 2)), axis=0)
     heats = rng.uniform(0.0, 3600.0, (20, 2))
     told, kept = {}, {}
+    rules: dict[float, list[tuple[float, ...]]] = {1.0: [], -1.0: []}
     for sign in (1.0, -1.0):
         model = model_of(sign, ((272.0, 0.7),))
-        controller = IdentifiedController(model, tuple(m.machine.actuator for m in model.maps), PLACE)
+        there = [a for m in model.maps for a in (m.machine.actuator, m.machine.beside) if a is not None]
+        controller = IdentifiedController(model, tuple(there), PLACE, electric=electric)
         forecast = forecast_of(sign, outdoor)
         rows = []
         for k in range(20):
@@ -90,17 +100,33 @@ def test_a_controller_that_cools_does_what_one_that_heats_does_in_the_mirror() -
             seen = seen_of(sign, second, zones[k], heats[k], outdoor[max(k - 1, 0)])
             action = controller.step(seen, Forecast(forecast.iloc[k : k + 32]))
             assert action.source == "optimal plan"
-            assert action.compare is not None
-            rule = action.compare()
-            rows.append([*(as_heated(action[setpoint_of(room, sign)], sign) for room in ROOMS),
-                         rule.plan, rule.rule, rule.stored])  # fmt: skip
+            rows.append([as_heated(action[setpoint_of(room, s)], sign) for s in (sign, -sign) for room in ROOMS])
+            if action.compare is not None:
+                rules[sign].append(astuple(action.compare()))
         told[sign] = np.array(rows)
         assert controller.conformal is not None and controller.conformal.count == 38
         kept[sign] = controller.conformal.values
     np.testing.assert_allclose(told[1.0], told[-1.0], atol=2e-3)
     np.testing.assert_allclose(kept[1.0], kept[-1.0])
+    np.testing.assert_allclose(rules[1.0], rules[-1.0], atol=2e-3)
     assert np.ptp(told[1.0][:, :2]) > 2.0 and controller.conformal.outside > 0  # of something that happened
-    assert (np.abs(told[1.0][:, 2:]).max(axis=0) > 0.05).all()
+    assert (told[1.0][:, 2:] >= told[1.0][:, :2] + 1.0 - 1e-9).all()
+    assert electric is not None or (np.abs(rules[1.0]).max(axis=0) > 0.05).all()
+
+
+def test_power_of_their_own_is_learned_by_what_is_taken() -> None:
+    """At 20 degC, which is its own mirror: a compressor of 2.1 kW where the map says 1.5."""
+    weights = []
+    for sign in (1.0, -1.0):
+        model = model_of(sign)
+        own = OwnPower(Curve({"command": 1500.0}, {}), 20.0)
+        model = replace(model, maps=tuple(replace(m, own=own) for m in model.maps))
+        learner = PowerLearner(model)
+        seen = seen_of(sign, 0, np.full(2, 293.0), np.array([4000.0, 2000.0]), REFERENCE)
+        learner.learn(seen, np.zeros(2), REFERENCE, np.zeros(10))
+        weights.append(learner.along(np.array([REFERENCE]), np.ones((1, 2))))
+    np.testing.assert_allclose(weights[0], weights[1])
+    assert weights[0][0, 0].sum() > 100.0
 
 
 def telemetry_of(sign: float, rows: Mapping[str, FloatArray]) -> PlantTelemetry:
@@ -164,22 +190,53 @@ def test_setpoints_of_cooling_are_chosen_when_they_are_asked_for() -> None:
         find_machines(actuators, columns, ROOMS, both)
     with pytest.raises(PlantError, match="expected a zone_air_cooling_temperature_setpoint"):
         find_machines(actuators[::2], columns, ROOMS, cooling=True)
+    with pytest.raises(PlantError, match="expected setpoints of cooling alone, found south/zone_air_heating"):
+        find_machines(actuators, columns, ROOMS, both[:1], cooling=True)
 
 
-def test_setpoints_of_a_zone_never_cross() -> None:
-    heating, cooling = (machine_of("south", sign) for sign in (1.0, -1.0))
-    both = [replace(a, beside=b.actuator) for a, b in ((heating, cooling), (cooling, heating))]
-    for machine in both:
-        for value in np.linspace(288.0, 300.0, 13):
-            values = machine.told(float(value), 297.15 if machine.sign > 0.0 else 293.15)
-            apart = values[cooling.name] - values[heating.name]
-            assert values[machine.name] == value and apart >= 1.0 - 1e-9
-    assert both[0].told(293.15, 297.15)[cooling.name] == 297.15  # at the other edge of the band where there is room
-    assert heating.told(293.15, 297.15) == {heating.name: 293.15}
+@pytest.mark.parametrize("ends", [(280.0, 306.3), (291.15, 297.15)])
+def test_setpoints_of_a_zone_never_cross(ends: tuple[float, float]) -> None:
+    """Also where the other one's range ends first: the setpoint gives way."""
+    for sign in (1.0, -1.0):
+        machine, other = machine_of("south", sign, more=True), 297.15 if sign > 0.0 else 293.15
+        assert machine.beside is not None
+        machine = replace(machine, beside=replace(machine.beside, lowest=ends[0], highest=ends[1]))
+        for value in np.linspace(284.0, 304.0, 21):
+            told = machine.told(float(value), other)
+            apart = told[setpoint_of("south", -1.0)] - told[setpoint_of("south", 1.0)]
+            assert apart >= 1.0 - 1e-9 and ends[0] <= told[setpoint_of("south", -sign)] <= ends[1]
+            assert told[machine.name] == value or ends[0] > 285.0
+    heating = machine_of("south", 1.0, more=True)
+    assert heating.told(293.15, 297.15)[setpoint_of("south", -1.0)] == 297.15  # at its edge where there is room
+    assert machine_of("south", 1.0).told(293.15, 297.15) == {heating.name: 293.15}
+
+
+def test_what_the_plant_has_of_a_zone_is_kept_clear_of() -> None:
+    """Setpoints of heating that cannot be told: as they are measured, else in the other half of the band."""
+    cooling, near, far = machine_of("south", -1.0), as_heated(297.15, -1.0), as_heated(293.15, -1.0)
+    stops = [as_heated(each, -1.0) for each in (
+        cooling.farthest(near, far, {setpoint_of("south", 1.0): 294.15}), cooling.farthest(near, far, {}),
+        machine_of("south", -1.0, more=True).farthest(near, far, {setpoint_of("south", 1.0): 294.15}),
+    )]  # fmt: skip
+    assert stops == pytest.approx([295.15, 295.15, 293.15])
+    assert machine_of("south", 1.0).farthest(293.15, 297.15, {}) == 297.15
+    assert machine_of("south", 1.0).farthest(293.15, 297.15, {setpoint_of("south", -1.0): 296.15}) == 295.15
+
+
+def test_a_controller_keeps_to_the_plant_that_it_runs() -> None:
+    """Whose ranges are narrower than where the model was identified, and which lacks the other setpoint."""
+    model = model_of(-1.0)
+    narrow = tuple(replace(m.machine.actuator, lowest=296.0, highest=300.0) for m in model.maps)
+    controller = IdentifiedController(model, narrow, PLACE)
+    forecast = forecast_of(-1.0, np.full(32, 265.0))
+    seen = seen_of(-1.0, int(forecast.index[0].timestamp()) - 900, np.full(2, 288.5), np.zeros(2), 265.0)
+    action = controller.step(seen, Forecast(forecast))
+    assert set(action) == {a.name for a in narrow} and all(296.0 <= value <= 300.0 for value in action.values())
+    assert {m.machine.beside for m in controller.model.maps} == {None}
 
 
 def test_the_rule_cools_to_the_lowest_edge_of_the_coming_hours() -> None:
-    machine = replace(machine_of("south", -1.0), beside=machine_of("south", 1.0).actuator)
+    machine = machine_of("south", -1.0, more=True)
     table = forecast_of(-1.0, np.full(32, 290.0))
     upper = table["south/comfort_upper_temperature"].to_numpy()
     assert upper[0] == as_heated(288.15, -1.0) and upper[12] == as_heated(293.15, -1.0)
@@ -192,8 +249,7 @@ def test_the_rule_cools_to_the_lowest_edge_of_the_coming_hours() -> None:
 
 @pytest.mark.parametrize("beside", [False, True])
 def test_an_excitation_stays_clear_of_the_heating(beside: bool) -> None:
-    alone = machine_of("south", -1.0)
-    machine = replace(alone, beside=machine_of("south", 1.0).actuator) if beside else alone
+    machine = machine_of("south", -1.0, more=beside)
     table = forecast_of(-1.0, np.full(2000, 290.0))
     low, high = as_heated(297.15, -1.0), as_heated(293.15, -1.0)
     excitation, cooled = Excitation([machine], STEP, ExcitationSettings(seed=1)), []
@@ -201,10 +257,39 @@ def test_an_excitation_stays_clear_of_the_heating(beside: bool) -> None:
         seen = seen_of(-1.0, 0, np.full(2, 293.0), np.zeros(2), 290.0)
         told = excitation.step(seen, Forecast(table.iloc[12 + k % 4 : 12 + k % 4 + 48]))
         cooled.append(told[machine.name])
-        if beside:
-            assert told[setpoint_of("south", 1.0)] <= told[machine.name] - 1.0 + 1e-9
+        if beside:  # at the edge of the coming steps, clear of the cooling
+            assert told[setpoint_of("south", 1.0)] == pytest.approx(min(low, told[machine.name] - 1.0))
     assert low + 0.2 - 1e-9 <= min(cooled) and max(cooled) <= high - 0.2 + 1e-9 and np.ptp(cooled) > 1.0
     assert (min(cooled) < 0.5 * (low + high)) == beside
+
+
+def test_an_excitation_that_cools_counts_the_edges_of_the_mirror() -> None:
+    """Three hours of the edge that it cools to and twelve of the other; a night's heating stays at the night's edge."""
+    stamps = pd.date_range("2023-07-10 00:15", periods=96, freq="15min", tz="Etc/GMT-1")
+    hours = np.arange(96) / 4.0
+    day = (hours >= 6.0) & (hours < 16.0)
+    table = pd.DataFrame({"south/comfort_lower_temperature": np.where(day, 293.15, 288.15),
+                          "south/comfort_upper_temperature": np.where(day, 297.15, 303.15)}, index=stamps)  # fmt: skip
+    layout = PointLayout((f"south/{ZONE_TEMPERATURE}",), "Etc/GMT-1")
+    cooled, heated = [], []
+    for seed in range(40):
+        excitation = Excitation([machine_of("south", -1.0, more=True)], STEP, ExcitationSettings(seed=seed))
+        told = excitation.step(Measurements(layout, 0, [298.0]), Forecast(table.iloc[4:64]))  # five hours before
+        cooled.append(told[setpoint_of("south", -1.0)])
+        heated.append(told[setpoint_of("south", 1.0)])
+    assert 293.35 <= min(cooled) < 295.0 and 300.0 < max(cooled) <= 302.95 and set(heated) == {288.15}
+
+
+def test_a_sensor_that_cooling_does_not_move_is_of_what_heats(recorded: dict[str, FloatArray]) -> None:
+    telemetry = telemetry_of(-1.0, recorded)
+    radiator = replace(telemetry, frame=telemetry.frame.assign(**{f"south/{HEATING_POWER}": 0.0}))
+    with pytest.raises(PlantError, match="expected negative heat while the zone is cooled"):
+        identify(radiator, [machine_of("south", -1.0)])
+    frame = radiator.frame.assign(**{f"south/{POWER}": recorded["heat"] / 3.0})
+    found = identify(replace(radiator, frame=frame), [machine_of("south", -1.0, more=True)])
+    assert found.model.maps[0].machine.heat == "" and found.model.box.metered == (False,)
+    assert float(found.model.heat(np.zeros((1, 4)), np.ones((1, 1)), 303.15)[0, 0]) < -500.0
+    assert any("no heat of south/zone_air_cooling" in note for note in found.notes)
 
 
 def test_a_mirror_is_its_own_inverse() -> None:

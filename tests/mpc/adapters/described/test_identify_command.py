@@ -100,6 +100,7 @@ def test_what_commands_refuse(tmp_path: Path, make_house: Callable[..., Path]) -
         (("control", plant, "--start", "2023-01-16"), "--start and --end, or neither"),
         (("control", tmp_path), "expected the description of the building, found no such file"),
         (("identify", plant, "--actuators", "pump/on"), "actuators: expected one of the plant, found 'pump/on'"),
+        (("identify", plant, "--cooling"), "actuators: expected a zone_air_cooling_temperature_setpoint"),
         (("identify", plant, "--start", "soon"), "--start: expected a local time"),
         (("identify", plant, "--telemetry", plant), "expected a .parquet or .csv file"),
     ):
