@@ -7,7 +7,7 @@ is excited for two weeks beside its coldest or hottest period, identified, and c
 at an hourly price, beside its own control and the rule at full speed. What fails is named.
 
 Run: ``python benchmarks/fleet_of_plants.py --out results/fleet_of_plants [--publish]`` with the extra ``[energyplus]``;
-two thirds of an hour of CPU time for the default. What is finished is kept, one file a building. Writes
+an hour of CPU time for the default. What is finished is kept, one file a building. Writes
 ``fleet_of_plants.json`` and ``.md``; with ``--publish`` also the table in ``docs/foreign_plants.md``.
 """
 

@@ -108,8 +108,8 @@ class Input(Signal):
     release : str, optional
         Input that hands the actuator over while it is 1; ``X_activate`` of ``X_u`` by default where it is there.
     capacity : tuple of tuple of float
-        Of a setpoint: outdoor temperatures [K], rising, and the most heat of its machine at each [W], as of a data
-        sheet; on straight lines between them.
+        Of a setpoint: outdoor temperatures [K], rising, and the most heat that its machine gives at each, or takes
+        where it cools [W], as of a data sheet; on straight lines between them.
     """
 
     range: tuple[Kelvin, Kelvin] | None = None
