@@ -21,6 +21,9 @@ _TOGETHER = 0.75
 #: Time that a reading is the mean of, at least and at most: a loop's water stores heat for some minutes [s].
 _MEAN_OF = (2700.0, 3600.0)
 
+#: Time over which what was given is there to be had, in that weather and in any that is milder [s].
+_SHOWN = 7200.0
+
 
 def out_of_reach(above: FloatArray, law: FloatArray) -> BoolArray:
     """Tell where a zone's own controller asks for all that its machine has, shape (..., n_machine).
@@ -44,10 +47,13 @@ class SharedLimit:
     - where nearly all of them have had setpoints out of reach since the step before, whatever holds them back;
     - where half of them have, and give less than three quarters of what each is *known* to reach alone in such weather.
 
-    It is the mean of the steps since, of three quarters of an hour at least and an hour at most. Until that has been
-    seen, and in milder weather than that, machines are taken to have sources of their own: sources are weakest in the
-    cold, where most is asked of them. All machines are taken for one source's: where there are two, and one of them is
-    at its limit alone, too little is relied on until more is seen.
+    It is the mean of the steps since, of three quarters of an hour at least and an hour at most. Where more has been
+    given for two hours in weather as hard, it is none: terminals also give less the warmer their zones are (fan coils
+    that cool, the colder), so that setpoints deep in the band are out of reach of what holds the edge of it.
+
+    Until it has been seen, and in milder weather than that, machines are taken to have sources of their own: sources
+    are weakest in the cold, where most is asked of them. All machines are taken for one source's: where there are two,
+    and one of them is at its limit alone, too little is relied on until more is seen.
 
     Parameters
     ----------
@@ -71,11 +77,14 @@ class SharedLimit:
     seen: InitVar[Iterable[tuple[float, float]]] = ()
     _limit: HeatLimit = field(init=False)
     _totals: deque[float] = field(init=False)
+    _weather: deque[float] = field(init=False)
     _wanted: BoolArray = field(init=False)
+    _shown: list[tuple[float, float]] = field(default_factory=list, init=False)
     _run: int = field(default=0, init=False)
 
     def __post_init__(self, seen: Iterable[tuple[float, float]]) -> None:
-        self._limit, self._totals = HeatLimit(seen), deque(maxlen=max(round(_MEAN_OF[1] / self.step), 1))
+        self._limit, count = HeatLimit(seen), max(round(_SHOWN / self.step), 1)
+        self._totals, self._weather = deque(maxlen=count), deque(maxlen=count)
         self._wanted = np.zeros(self.weights.size, dtype=bool)
 
     @property
@@ -98,7 +107,21 @@ class SharedLimit:
         """
         if not self.readings:
             return np.full(outdoor.shape, np.inf)
-        return np.where(outdoor > self.readings[-1][0] + BIN, np.inf, self._limit.at(outdoor))
+        known = np.where(outdoor > self.readings[-1][0] + BIN, np.inf, self._limit.at(outdoor))
+        return np.maximum(known, self.shown(outdoor))
+
+    def shown(self, outdoor: FloatArray) -> FloatArray:
+        """Load that was given for two hours in weather as hard, shape (n,) [-]; 0 where none was.
+
+        Parameters
+        ----------
+        outdoor : ndarray, shape (n,)
+            Outdoor air [K].
+        """
+        most = np.zeros(np.shape(outdoor))
+        for weather, load in self._shown:
+            most = np.where(outdoor >= weather, np.maximum(most, load), most)
+        return most
 
     def learn(self, outdoor: float, loads: FloatArray, wanted: BoolArray, limits: Sequence[HeatLimit]) -> BoolArray:
         """Take a step, and tell which machines it says something of alone, shape (n_machine,).
@@ -117,23 +140,41 @@ class SharedLimit:
         shares, free = self.shares, np.ones(self.weights.size, dtype=bool)
         if not shares.any() or not np.isfinite(outdoor) or not np.isfinite(loads[shares > 0.0]).all():
             self._totals.clear()  # a mean over a gap is none
+            self._weather.clear()
             self._wanted, self._run = np.zeros_like(self._wanted), 0
             return free
         held, self._wanted = wanted & self._wanted, np.array(wanted)
         self._totals.append(float(shares @ np.nan_to_num(loads)))
+        self._weather.append(outdoor)
+        self._show()
         known = np.array([limit.knows(outdoor) for limit in limits])
         back = self._holds_back(held, loads, known, limits, outdoor)
         self._run = self._run + 1 if back else 0
         steps = self._run + 1  # the step before had the setpoints out of reach too
         if back and steps * self.step >= _MEAN_OF[0]:
-            self._limit.learn(outdoor, float(np.mean([*self._totals][-steps:])))
-        elif len(self._totals) == self._totals.maxlen and self._limit.knows(outdoor):
+            mean = float(np.mean([*self._totals][-min(steps, self._hour) :]))
+            if mean >= self.shown(np.array([outdoor]))[0]:
+                self._limit.learn(outdoor, mean)
+        elif len(self._totals) >= self._hour and self._limit.knows(outdoor):
             # more than was thought possible, for an hour, is possible
-            mean = float(np.mean(self._totals))
+            mean = float(np.mean([*self._totals][-self._hour :]))
             if mean > self._limit.likely(np.array([outdoor]))[0]:
                 self._limit.learn(outdoor, mean)
         part = shares[wanted].sum() if wanted.sum() > 1 else 0.0
         return ~wanted if part >= _ALL or (part >= _SEVERAL and known[wanted].all()) else free
+
+    @property
+    def _hour(self) -> int:
+        """Steps of the longest mean."""
+        return max(round(_MEAN_OF[1] / self.step), 1)
+
+    def _show(self) -> None:
+        """Take what was given for two hours, in the mildest weather of them: of those in weather as hard, the most."""
+        if len(self._totals) < (self._totals.maxlen or 0):
+            return
+        mean, outdoor = float(np.mean(self._totals)), max(self._weather)
+        if mean > self.shown(np.array([outdoor]))[0]:
+            self._shown = [(w, load) for w, load in self._shown if w < outdoor or load > mean] + [(outdoor, mean)]
 
     def _holds_back(
         self, held: BoolArray, loads: FloatArray, known: BoolArray, limits: Sequence[HeatLimit], outdoor: float
@@ -185,4 +226,4 @@ def shared_of(
     shared, alone = SharedLimit(weights, step), [HeatLimit(seen) for seen in limits]
     for k in range(len(outdoor)):
         shared.learn(float(outdoor[k]), loads[k], wanted[k] & (loads[k] > RUNS), alone)
-    return shared.readings
+    return tuple((at, load) for at, load in shared.readings if load >= shared.shown(np.array([at]))[0])
