@@ -136,6 +136,8 @@ def _loads(telemetry: PlantTelemetry, machines: Sequence[Machine], data: GreyBox
     emitter = box.emitter(states)
     first = round(86_400.0 / telemetry.step)  # the filter's start
     emitter[:first] = emitter[first : 2 * first].mean(axis=0) if len(emitter) > 2 * first else EMITTER
+    if machines[0].sign < 0.0:  # what cools blows air: of its water a floor tells nothing
+        emitter[:] = EMITTER
     return Loads(level, data.outdoor, emitter)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from scipy.linalg import expm
 
 from calibration.errors import CalibrationError
 from calibration.estimation.state_space import REFERENCE
+from calibration.grey_box import fit
 from calibration.grey_box.fit import GreyBoxData, fit_grey_box, follow, predict, run_starts, steady_gain
 from calibration.grey_box.judge import judge
 from calibration.grey_box.network import GreyBox
@@ -128,3 +130,23 @@ def test_what_does_not_fit_is_refused() -> None:
         GreyBox.from_dict(box.to_dict() | {"point": [1.0]})
     with pytest.raises(CalibrationError, match="buildingmpc identify"):
         GreyBox.from_dict({})
+
+
+@pytest.mark.parametrize(("errors", "kept"), [((0.3,), 0), ((0.8, 0.2), 1), ((0.8, 0.9), 0)])
+def test_a_fit_that_went_astray_is_begun_again(errors: tuple[float, ...], kept: int, monkeypatch: Any) -> None:
+    """With heavier air; the better of the two goes on to the noise and the second part."""
+    start = GreyBox.start({"a": 100.0, "b": 50.0}, (), {"h": ("a", "b")}, (True,))
+    begun = []
+
+    def fitted(box: GreyBox, data: Any, progress: Any, part: int) -> tuple[GreyBox, float]:
+        begun.append((box, part))
+        return replace(box, point=box.point + 1.0), errors[len(begun) - 1] if part == 0 else 0.0
+
+    monkeypatch.setattr(fit, "_fitted", fitted)
+    monkeypatch.setattr(fit, "tune_noise", lambda box, data: box)
+    found = fit.fit_grey_box(start, None)
+    assert [part for _, part in begun] == [0] * len(errors) + [1]
+    if len(errors) > 1:
+        np.testing.assert_allclose(begun[1][0].capacity[:2], 3.0 * start.capacity[:2])
+        np.testing.assert_allclose(begun[1][0].capacity[2:], start.capacity[2:])
+    np.testing.assert_allclose(found.point, begun[kept][0].point + 2.0)

@@ -61,7 +61,9 @@ def test_a_source_is_found_by_what_terminals_give_together() -> None:
     cold = np.arange(258.0, 272.0, 2.0)
     said = shared.at(cold) / np.array([_source(t) for t in cold])
     assert (said < 1.05).all() and (said > 0.93).all()  # a standard deviation below the mean is relied on
-    assert (own.at(cold) > 0.93 * np.array([_alone(t) for t in cold])).all()  # with sources of their own nothing is lost
+    assert (
+        own.at(cold) > 0.93 * np.array([_alone(t) for t in cold])
+    ).all()  # with sources of their own nothing is lost
 
 
 @pytest.mark.parametrize("band", [0.5, 1.0, 2.0])
@@ -117,6 +119,28 @@ def test_a_reading_is_the_mean_since_more_was_wanted_and_rises_with_what_is_give
             shared.learn(outdoor, np.full(2, 1.1), ~every, limits[:2])
     assert shared.readings == ((265.0, pytest.approx(1.1)),)  # of weather in which nobody wanted more nothing is said
     assert np.isinf(shared.at(np.array([267.5]))[0]) and shared.at(np.array([250.0]))[0] < 1.1
+
+
+def test_what_was_given_in_harder_weather_is_no_limit() -> None:
+    """Setpoints deep in the band are out of reach of what two hours on a colder day gave."""
+    limits, every, here = _known(), np.ones(2, dtype=bool), np.array([265.0])
+    shared = SharedLimit(np.full(2, FULL), STEP)
+    for outdoor in [258.0] * 4 + [262.0] * 4:  # two hours, in weather of 262 K and colder
+        shared.learn(outdoor, np.full(2, 0.9), ~every, limits[:2])
+    assert shared.shown(np.array([261.9, 262.0, 280.0])).tolist() == [0.0, 0.9, 0.9] and np.isinf(shared.at(here)[0])
+    for _ in range(8):
+        shared.learn(265.0, np.full(2, 0.6), every, limits[:2])
+    assert shared.readings == () and np.isinf(shared.at(here)[0])
+    for _ in range(4):  # colder than that it is one
+        shared.learn(260.0, np.full(2, 0.6), every, limits[:2])
+    assert [load for _, load in shared.readings] == [pytest.approx(0.6)]
+    told = shared.at(np.array([260.0, 261.5, 262.0]))
+    assert told[0] < 0.65 and told[1] < 0.7 and told[2] >= 0.9
+    outdoor, loads = np.array([262.0] * 8 + [265.0] * 6), np.repeat([0.9, 0.6], [8, 6])[:, None] * np.ones(2)
+    wanted = np.repeat([False, True], [8, 6])[:, None] & every
+    before = shared_of(np.full(2, FULL), STEP, outdoor, loads, wanted, [[(265.0, 1.2)]] * 2)
+    after = shared_of(np.full(2, FULL), STEP, outdoor[::-1], loads[::-1], wanted[::-1], [[(265.0, 1.2)]] * 2)
+    assert before == after == ()  # also where it is seen afterwards
 
 
 def test_telemetry_tells_what_the_controller_would_have_learned() -> None:
