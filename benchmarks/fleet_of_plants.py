@@ -70,7 +70,7 @@ def table_of(found: list[dict[str, Any]]) -> str:
         rows.append((
             *head, *(f"{100.0 * (mpc['cost'] / other['cost'] - 1.0):+.1f}" for other in (own, rule)),
             ", ".join(f"{each['above' if ALL[row['building']].cooled else 'below']:.2f}" for each in (own, rule, mpc)),
-            "-" if starts_a_day is None else f"{starts_a_day:.1f}",
+            "-" if not starts_a_day else f"{starts_a_day:.1f}",
             f"{row['identify_cpu_seconds']:.0f}, {mpc['cpu_seconds']:.0f}",
         ))  # fmt: skip
     return markdown(COLUMNS, rows)

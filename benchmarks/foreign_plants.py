@@ -96,7 +96,7 @@ def table_of(runs: list[dict[str, Any]]) -> str:
         base, starts = own.get((row["plant"], row["period"]), math.nan), row["starts_a_day"]
         rows.append((
             *head, f"{row['cost']:.3f}", f"{100.0 * (row['cost'] / base - 1.0):+.1f}", f"{row['below']:.2f}",
-            f"{row['above']:.2f}", f"{hours:.1f}", "-" if starts is None else f"{starts:.1f}",
+            f"{row['above']:.2f}", f"{hours:.1f}", "-" if not starts else f"{starts:.1f}",
             f"{row['cpu_seconds']:.0f}" if row["cpu_seconds"] >= 10.0 else f"{row['cpu_seconds']:.1f}",
         ))  # fmt: skip
     return markdown(COLUMNS, rows)
