@@ -42,7 +42,7 @@ def perform(name: str, out: Path, days: int) -> dict[str, Any]:
     if path.exists():
         return dict(json.loads(path.read_text(encoding="utf-8")))
     data: dict[str, Any] = {"building": name, "about": ALL[name].about, "days": days, "code": code()}
-    begin = pd.Timestamp(next(iter(ALL[name].starts.values())))
+    begin = pd.Timestamp(ALL[name].begin)
     stage = "identify"
     try:
         data["identify_cpu_seconds"] = identified(name, out)[1]["identify_cpu_seconds"]

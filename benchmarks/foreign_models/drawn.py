@@ -72,24 +72,29 @@ def _loss(fabric: Fabric, area: float, envelope: float, glass: float, height: fl
     return 35.0 * (walls + 0.33 * fabric.air_changes * area * height)
 
 
+def _gain(fabric: Fabric, area: float, envelope: float, glass: float, height: float, inside: float) -> float:
+    """Heat that a building gains while it is 12 K warmer outdoors, with sun on a third of its glass [W]."""
+    return 12.0 / 35.0 * _loss(fabric, area, envelope, glass, height) + 600.0 * fabric.glass[1] * glass / 3.0 + inside
+
+
+def _heat_pump(rng: np.random.Generator, need: float, times: tuple[float, float]) -> HeatPump:
+    """Draw a heat pump of some times what a building needs [W]."""
+    return HeatPump(
+        round(need * float(rng.uniform(*times)), -2), float(rng.uniform(3.5, 4.8)), float(rng.uniform(0.1, 0.5)),
+        float(rng.uniform(0.2, 0.4)),
+    )  # fmt: skip
+
+
 def _house(rng: np.random.Generator) -> _Parts:
     """Draw a house with a heated floor."""
     fabric, length, width = _fabric(rng), float(rng.uniform(9.0, 16.0)), float(rng.uniform(8.0, 13.0))
     south = float(rng.uniform(0.04, 0.1)) * length * width
     need = _loss(fabric, length * width, 2.0 * length * width + 5.4 * (length + width), 1.75 * south, 2.7)
-    machine = HeatPump(
-        round(need * float(rng.uniform(1.2, 1.8)), -2), float(rng.uniform(3.5, 4.8)), float(rng.uniform(0.1, 0.5)),
-        float(rng.uniform(0.2, 0.4)),
-    )  # fmt: skip
+    machine = _heat_pump(rng, need, (1.2, 1.8))
     of = House(fabric, length, width, south=south, machine=machine, people=float(rng.integers(1, 6)),
                appliances=float(rng.uniform(100.0, 500.0)))  # fmt: skip
     about = f"House of {of.area:.0f} m2, heated floor, heat pump of {machine.capacity / 1e3:.1f} kW"
     return about, partial(house, of), partial(of_house, of)
-
-
-def _gain(fabric: Fabric, area: float, envelope: float, glass: float, height: float, inside: float) -> float:
-    """Heat that a building gains while it is 12 K warmer outdoors, with sun on a third of its glass [W]."""
-    return 12.0 / 35.0 * _loss(fabric, area, envelope, glass, height) + 600.0 * fabric.glass[1] * glass / 3.0 + inside
 
 
 def _flats(rng: np.random.Generator) -> _Parts:
@@ -142,16 +147,18 @@ def _rooms(rng: np.random.Generator, long: tuple[float, float], height: tuple[fl
     return Rooms(columns, rows, length, depth, tall, (share * length * tall, share * depth * tall))
 
 
+def _loss_of(fabric: Fabric, rooms: Rooms) -> float:
+    """Heat that rooms on the ground and under the roof lose at 35 K [W]."""
+    area, (walls, glass) = len(rooms.names) * rooms.area, rooms.outer
+    return _loss(fabric, area, 2.0 * area + walls - glass, glass, rooms.height)
+
+
 def _office_of(rng: np.random.Generator) -> Office:
     """Draw an office."""
     fabric, rooms = _fabric(rng), _rooms(rng, (7.0, 14.0), (2.7, 3.4))
-    count, (walls, glass) = len(rooms.names), rooms.outer
-    need = _loss(fabric, count * rooms.area, 2.0 * count * rooms.area + walls - glass, glass, rooms.height)
+    count, need = len(rooms.names), _loss_of(fabric, rooms)
     coil = round(need / count * float(rng.uniform(1.5, 2.5)), -2)
-    machine = HeatPump(
-        round(need * float(rng.uniform(1.7, 2.4)), -2), float(rng.uniform(3.5, 4.8)), float(rng.uniform(0.1, 0.5)),
-        float(rng.uniform(0.2, 0.4)),
-    )  # fmt: skip
+    machine = _heat_pump(rng, need, (1.7, 2.4))
     begin = int(rng.integers(6, 10))
     return Office(fabric, rooms, machine, coil, round(rooms.area / float(rng.uniform(10.0, 25.0))),
                   rooms.area * float(rng.uniform(1.0, 5.0)), (begin, begin + int(rng.integers(8, 12))))  # fmt: skip
@@ -188,8 +195,7 @@ def _cooled_office(rng: np.random.Generator) -> _Parts:
 def _dwelling(rng: np.random.Generator) -> _Parts:
     """Draw a dwelling with radiators on a gas boiler."""
     fabric, rooms = _fabric(rng), _rooms(rng, (3.5, 6.5), (2.4, 2.9))
-    count, (walls, glass) = len(rooms.names), rooms.outer
-    need = _loss(fabric, count * rooms.area, 2.0 * count * rooms.area + walls - glass, glass, rooms.height)
+    count, need = len(rooms.names), _loss_of(fabric, rooms)
     radiator = round(need / count * float(rng.uniform(1.3, 2.0)), -2)
     boiler = round(need * float(rng.uniform(1.1, 2.0)), -2)
     begin = int(rng.integers(6, 10))

@@ -44,3 +44,8 @@ class ForeignPlant:
     def starts(self) -> dict[str, str]:
         """Begin of each of its periods."""
         return starts(weather_path(self.weather), self.cooled)
+
+    @property
+    def begin(self) -> str:
+        """Begin of its hardest period."""
+        return self.starts["hottest" if self.cooled else "coldest"]

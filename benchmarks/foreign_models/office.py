@@ -11,7 +11,7 @@ from foreign_models import objects as ep
 from foreign_models.heat_pump import Chiller, HeatPump, heat_pump
 from foreign_models.rooms import Rooms
 from foreign_models.thermostats import COOLING, clock, comfort, cooling_clock, present, thermostat, thermostat_points
-from foreign_models.water import scheduled_loop, supply_water, supply_water_actuator
+from foreign_models.water import scheduled_loop, supply_water, supply_water_points
 
 FABRIC = ep.Fabric(wall=0.06, roof=0.12, floor=0.06, glass=(1.8, 0.4), air_changes=0.5, goods=3.0)
 ROOMS = Rooms(columns=2, rows=2, length=12.0, depth=10.0, height=3.0, glass=(10.0, 8.0))
@@ -88,7 +88,7 @@ def office(of: Office | None = None) -> Objects:
     if of.chiller is not None:
         cooling = cooling_clock(of.work), cooling_clock(NOBODY)
     for number, zone in enumerate(listed):
-        ep.merge(model, of.rooms.box(number, listed))
+        ep.merge(model, of.rooms.box(number))
         ep.merge(model, ep.inside(zone, of.fabric, of.rooms.area, of.people, "presence", of.appliances))
         ep.merge(model, thermostat(zone, clock(of.work), clock(NOBODY), cooling))
         ep.merge(model, ep.equipment(zone, [(_UNIT, f"{zone} fan coil")], f"{zone} unit out", f"{zone} unit in"))
@@ -189,13 +189,10 @@ def description(of: Office | None = None) -> dict[str, Any]:
         electricity.append(fan)
     if of.chiller is not None:
         electricity.append(f"{_CHILLER}, Heat Pump Electricity Rate")
-    setpoint, acted = supply_water_actuator("heat_pump", "30 degC", "50 degC")
-    told["measurements"] |= {
-        "heat_pump/electrical_power_sensor": power, "hot_water/pump_power_sensor": pump,
+    measured, acted = supply_water_points(PUMP, "heat_pump", "HOT LOOP", "30 degC", "50 degC")
+    told["measurements"] |= measured | {
+        "heat_pump/electrical_power_sensor": power,
         "heat_pump/heating_power_sensor": f"{PUMP}, Heat Pump Load Side Heat Transfer Rate",
-        "heat_pump/supply_water_temperature_sensor": f"{PUMP} out, System Node Temperature",
-        "heat_pump/return_water_temperature_sensor": f"{PUMP} in, System Node Temperature",
-        setpoint: "HOT LOOP water, Schedule Value",
-    }  # fmt: skip
+    }
     told["actuators"] |= acted
     return told | {"energy": {"electricity": electricity}}

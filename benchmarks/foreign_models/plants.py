@@ -79,7 +79,7 @@ def describe(name: str, errors: str = "day_ahead") -> dict[str, Any]:
         "plant": {"kind": "energyplus", "model": f"{name}.epJSON", "weather": plant.weather,
                   "steps_per_hour": STEPS_PER_HOUR},
         "control_step": 900.0,
-        "period": {"start": next(iter(plant.starts.values())), "days": DAYS, "warm_up_days": WARM_UP},
+        "period": {"start": plant.begin, "days": DAYS, "warm_up_days": WARM_UP},
         "zones": told["zones"],
         "measurements": told["measurements"] | station,
         "actuators": told["actuators"],

@@ -11,7 +11,7 @@ from energyplus_trials.frame import Objects
 from foreign_models import objects as ep
 from foreign_models.rooms import Rooms
 from foreign_models.thermostats import clock, comfort, present, thermostat, thermostat_points
-from foreign_models.water import scheduled_loop, supply_water, supply_water_actuator
+from foreign_models.water import scheduled_loop, supply_water, supply_water_points
 
 BOILER = "BOILER"
 FABRIC = ep.Fabric(wall=0.08, roof=0.12, floor=0.06, glass=(1.8, 0.6), air_changes=0.5, goods=3.0)
@@ -76,7 +76,7 @@ def dwelling(of: Dwelling | None = None) -> Objects:
     model, listed = ep.start(of.fabric), of.rooms.names
     flow = _SPREAD * of.radiator / 1e3  # m3/s
     for number, (zone, hours) in enumerate(of.present.items()):
-        ep.merge(model, of.rooms.box(number, listed))
+        ep.merge(model, of.rooms.box(number))
         ep.merge(model, ep.inside(zone, of.fabric, of.rooms.area, of.people, f"{zone} presence", of.appliances))
         ep.merge(model, thermostat(zone, *(clock(each, cool=_COOL) for each in hours)))
         ep.merge(model, ep.equipment(zone, [(_RADIATOR, f"{zone} radiator")]))
@@ -158,13 +158,10 @@ def description(of: Dwelling | None = None) -> dict[str, Any]:
     gas, pump, fan = (f"{name} Rate" for name in (
         f"{BOILER}, Boiler NaturalGas", "HOT LOOP pump, Pump Electricity", f"{BOILER}, Boiler Ancillary Electricity",
     ))  # fmt: skip
-    setpoint, acted = supply_water_actuator("boiler", "35 degC", "70 degC")
-    told["measurements"] |= {
-        "boiler/gas_power_sensor": gas, "hot_water/pump_power_sensor": pump,
+    measured, acted = supply_water_points(BOILER, "boiler", "HOT LOOP", "35 degC", "70 degC")
+    told["measurements"] |= measured | {
+        "boiler/gas_power_sensor": gas,
         "boiler/heating_power_sensor": f"{BOILER}, Boiler Heating Rate",
-        "boiler/supply_water_temperature_sensor": f"{BOILER} out, System Node Temperature",
-        "boiler/return_water_temperature_sensor": f"{BOILER} in, System Node Temperature",
-        setpoint: "HOT LOOP water, Schedule Value",
-    }  # fmt: skip
+    }
     told["actuators"] |= acted
     return told | {"energy": {"electricity": [pump, fan], "gas": [gas]}, "prices": {"gas": GAS}}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from energyplus_trials.frame import Objects
@@ -52,16 +51,15 @@ class Rooms:
         walls = self.height * (along * self.length + across * self.depth)
         return walls, along * self.glass[0] + across * self.glass[1]
 
-    def box(self, number: int, listed: Sequence[str]) -> Objects:
+    def box(self, number: int) -> Objects:
         """Return a room's faces and windows.
 
         Parameters
         ----------
         number : int
             In the order of `names`.
-        listed : sequence of str
-            What the rooms are called, in that order.
         """
+        listed = self.names
         i, k = number % self.columns, number // self.columns
         behind, glass = {}, {}
         for side, (a, b) in _BESIDE.items():

@@ -158,16 +158,26 @@ def supply_water(loop: str, reset: tuple[float, float, float, float]) -> Objects
     return found
 
 
-def supply_water_actuator(machine: str, lowest: str, highest: str) -> tuple[str, dict[str, Any]]:
-    """Return the supply water's point and its actuator, as ``plant.yaml`` has them.
+def supply_water_points(
+    machine: str, entity: str, loop: str, lowest: str, highest: str
+) -> tuple[dict[str, str], dict[str, Any]]:
+    """Return measured points and the actuator of a loop's water (`supply_water`), as ``plant.yaml`` has them.
 
     Parameters
     ----------
-    machine : str
-        Whose water it is.
+    machine, entity : str
+        EnergyPlus' name of what heats it, and ours.
+    loop : str
+        A `scheduled_loop`.
     lowest, highest : str
-        Range, with units.
+        Range of the supply water, with units.
     """
-    setpoint = f"{machine}/supply_water_temperature_setpoint"
+    setpoint = f"{entity}/supply_water_temperature_setpoint"
     signal = "SUPPLY WATER, Schedule:Constant, Schedule Value"
-    return setpoint, {setpoint: {"signal": signal, "range": [lowest, highest]}}
+    measured = {
+        "hot_water/pump_power_sensor": f"{loop} pump, Pump Electricity Rate",
+        f"{entity}/supply_water_temperature_sensor": f"{machine} out, System Node Temperature",
+        f"{entity}/return_water_temperature_sensor": f"{machine} in, System Node Temperature",
+        setpoint: f"{loop} water, Schedule Value",
+    }
+    return measured, {setpoint: {"signal": signal, "range": [lowest, highest]}}

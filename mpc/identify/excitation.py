@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -42,6 +43,20 @@ class ExcitationSettings:
     back: float = 3600.0
     part_load: float = 0.35
     seed: int = 0
+
+
+class _Place(NamedTuple):
+    """Where the zones of a machine are in their bands [K].
+
+    Least distances from the lower and from the upper edges, these edges, and the edge of the coming two steps that the
+    machine drives the zones to.
+    """
+
+    below: float
+    above: float
+    low: float
+    high: float
+    other: float
 
 
 class Excitation:
@@ -98,23 +113,13 @@ class Excitation:
                 self._draw(machine, place, k, measurements)
             value = self._value[machine.name]
             if machine.role == "setpoint":
-                chosen |= machine.told(value, self._other_edge(machine, forecast))
+                chosen |= machine.told(value, place.other)
             else:
                 chosen[machine.name] = value
         return chosen
 
-    def _other_edge(self, machine: Machine, forecast: Forecast | None) -> float:
-        """Edge of the coming two steps that a machine drives its zones away from [K]; far off without a forecast."""
-        if forecast is None:
-            return machine.sign * np.inf
-        side = "upper" if machine.sign > 0.0 else "lower"
-        edges = forecast.table[[f"{zone}/comfort_{side}_temperature" for zone in machine.serves]].iloc[:2].to_numpy()
-        return float(machine.sign * (machine.sign * edges).min())
-
-    def _place(
-        self, machine: Machine, measurements: Measurements, forecast: Forecast | None
-    ) -> tuple[float, float, float, float] | None:
-        """Coldest and warmest distance of the served zones from the lower and upper edges, and the edges [K]."""
+    def _place(self, machine: Machine, measurements: Measurements, forecast: Forecast | None) -> _Place | None:
+        """Find where the served zones are in their bands; None while nothing tells."""
         if forecast is None:
             return None
         counts = tuple(max(round(s / self.step_seconds), 1) for s in self.settings.ahead)
@@ -124,38 +129,38 @@ class Excitation:
             name = f"{zone}/{ZONE_TEMPERATURE}"
             if name not in measurements or not np.isfinite(measurements[name]):
                 return None
-            low = float(forecast.table[f"{zone}/comfort_lower_temperature"].iloc[:for_low].max())
-            high = float(forecast.table[f"{zone}/comfort_upper_temperature"].iloc[:for_high].min())
-            found.append((measurements[name] - low, high - measurements[name], low, high))
-        below, above, lows, highs = zip(*found, strict=True)
-        return min(below), min(above), max(lows), min(highs)
+            lower, upper = (forecast.table[f"{zone}/comfort_{side}_temperature"] for side in ("lower", "upper"))
+            low, high = float(lower.iloc[:for_low].max()), float(upper.iloc[:for_high].min())
+            other = upper.iloc[:2].min() if machine.sign > 0.0 else lower.iloc[:2].max()
+            found.append((measurements[name] - low, high - measurements[name], low, high, float(other)))
+        below, above, lows, highs, others = zip(*found, strict=True)
+        other = min(others) if machine.sign > 0.0 else max(others)
+        return _Place(min(below), min(above), max(lows), min(highs), other)
 
-    def _unsafe(self, machine: Machine, place: tuple[float, float, float, float] | None, value: float) -> bool:
+    def _unsafe(self, machine: Machine, place: _Place | None, value: float) -> bool:
         """Whether a zone is at an edge and the level drives it on; setpoints lie within the band anyhow."""
         if place is None or machine.role == "setpoint":
             return False
         full = value > 0.5 * (machine.actuator.lowest + machine.actuator.highest)
         cold, warm = self.settings.guard
-        return place[1] < warm if full else place[0] < cold
+        return place.above < warm if full else place.below < cold
 
-    def _draw(
-        self, machine: Machine, place: tuple[float, float, float, float], k: int, measurements: Measurements
-    ) -> None:
+    def _draw(self, machine: Machine, place: _Place, k: int, measurements: Measurements) -> None:
         """Draw a level and how long it is held."""
         random, actuator = self._random, machine.actuator
         shortest, longest = (max(round(s / self.step_seconds), 1) for s in self.settings.hold)
         self._until[machine.name] = k + int(random.integers(shortest, longest + 1))
         low, high = actuator.lowest, actuator.highest
         if machine.role == "setpoint":
-            edges = place[2:] if machine.sign > 0.0 else place[:1:-1]
+            edges = (place.low, place.high) if machine.sign > 0.0 else (place.high, place.low)
             near, far = (as_heated(edge, machine.sign) for edge in edges)
             far = machine.farthest(near, far, measurements) - self.settings.guard[0]
             near += self.settings.guard[0]
             value = as_heated(random.uniform(min(near, far), max(near, far)), machine.sign)
             self._value[machine.name] = float(np.clip(value, low, high))
             return
-        room = max(place[0] + place[1] - self.settings.guard[1], 0.1)
-        share = float(np.clip(0.9 - 0.8 * place[0] / room, 0.05, 0.95))
+        room = max(place.below + place.above - self.settings.guard[1], 0.1)
+        share = float(np.clip(0.9 - 0.8 * place.below / room, 0.05, 0.95))
         least = actuator.minimum if actuator.minimum is not None else low + 0.2 * (high - low)
         if random.random() > share:
             self._value[machine.name] = low

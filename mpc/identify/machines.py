@@ -284,7 +284,8 @@ def find_machines(
     PlantError.unless(chosen, "actuators", expected, ", ".join(by_name) or "none")
     cools = [name for name in chosen if name in setpoints[COOLING_SETPOINT]]
     expected = "setpoints of cooling alone" if cooling else "machines that all heat, or all cool"
-    PlantError.unless(len(cools) in (len(chosen), 0 if not cooling else -1), "actuators", expected, ", ".join(chosen))
+    fits = len(cools) == len(chosen) or not (cools or cooling)
+    PlantError.unless(fits, "actuators", expected, ", ".join(chosen))
     heats = [c for c in columns if c.rpartition("/")[2] == HEATING_POWER]
     made = []
     for name in chosen:

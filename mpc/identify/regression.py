@@ -74,20 +74,20 @@ class Loads:
 
 
 def _design(
-    loads: Loads, known: BoolArray, machines: Sequence[int], base: bool, standing: bool
+    loads: Loads, known: BoolArray, machines: Sequence[int], base: bool
 ) -> tuple[FloatArray, list[tuple[int, str]]]:
     """Columns of a regression, by machine and feature; a constant first, where something may be left."""
     columns, owners = ([np.ones(int(known.sum()))], [(-1, "constant")]) if base else ([], [])
     for m in machines:
         for name, feature in loads.features(m).items():
             column = feature[known[loads.known]]
-            if name != "standing" or (standing and not (base and column.all())):
+            if name != "standing" or not (base and column.all()):
                 columns.append(column)
                 owners.append((m, name))
     return np.column_stack(columns), owners
 
 
-def design_of(loads: Loads, machines: Sequence[int], *, standing: bool = True) -> FloatArray:
+def design_of(loads: Loads, machines: Sequence[int]) -> FloatArray:
     """Columns of a regression, a constant first, shape (n_time, n_column); NaN where a load is unknown.
 
     Parameters
@@ -96,10 +96,8 @@ def design_of(loads: Loads, machines: Sequence[int], *, standing: bool = True) -
         Of all machines.
     machines : sequence of int
         Which machines have a part in it.
-    standing : bool
-        Whether a machine may draw power at any load above 0.
     """
-    columns, _ = _design(loads, loads.known, machines, True, standing)
+    columns, _ = _design(loads, loads.known, machines, True)
     design = np.full((len(loads.level), columns.shape[1]), np.nan)
     design[loads.known] = columns
     return design
@@ -127,7 +125,7 @@ def left_out_error(design: FloatArray, values: FloatArray, per_day: int) -> floa
 
 
 def regress(
-    loads: Loads, values: FloatArray, machines: Sequence[int], *, base: bool = True, standing: bool = True
+    loads: Loads, values: FloatArray, machines: Sequence[int], *, base: bool = True
 ) -> tuple[list[Curve], float]:
     """Regress what is measured on the features of machines, a constant beside them.
 
@@ -142,8 +140,6 @@ def regress(
     base : bool
         Whether something may be left when all machines are off; nothing tells that from the standing part of a machine
         that never stops, which is then counted to it.
-    standing : bool
-        Whether a machine may draw power at any load above 0.
 
     Returns
     -------
@@ -158,7 +154,7 @@ def regress(
         When there are too few steps with known loads.
     """
     rows = loads.known & np.isfinite(values)
-    design, owners = _design(loads, rows, machines, base, standing)
+    design, owners = _design(loads, rows, machines, base)
     found, deviations = least_squares(design, values[rows])
     curves = [curve_of([name if owner == m else "" for owner, name in owners], found, deviations) for m in machines]
     return curves, float(found[0]) if base else 0.0

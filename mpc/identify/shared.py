@@ -76,15 +76,13 @@ class SharedLimit:
     step: float
     seen: InitVar[Iterable[tuple[float, float]]] = ()
     _limit: HeatLimit = field(init=False)
-    _totals: deque[float] = field(init=False)
-    _weather: deque[float] = field(init=False)
+    _course: deque[tuple[float, float]] = field(init=False)
     _wanted: BoolArray = field(init=False)
     _shown: list[tuple[float, float]] = field(default_factory=list, init=False)
     _run: int = field(default=0, init=False)
 
     def __post_init__(self, seen: Iterable[tuple[float, float]]) -> None:
-        self._limit, count = HeatLimit(seen), max(round(_SHOWN / self.step), 1)
-        self._totals, self._weather = deque(maxlen=count), deque(maxlen=count)
+        self._limit, self._course = HeatLimit(seen), deque(maxlen=max(round(_SHOWN / self.step), 1))
         self._wanted = np.zeros(self.weights.size, dtype=bool)
 
     @property
@@ -139,40 +137,39 @@ class SharedLimit:
         """
         shares, free = self.shares, np.ones(self.weights.size, dtype=bool)
         if not shares.any() or not np.isfinite(outdoor) or not np.isfinite(loads[shares > 0.0]).all():
-            self._totals.clear()  # a mean over a gap is none
-            self._weather.clear()
+            self._course.clear()  # a mean over a gap is none
             self._wanted, self._run = np.zeros_like(self._wanted), 0
             return free
         held, self._wanted = wanted & self._wanted, np.array(wanted)
-        self._totals.append(float(shares @ np.nan_to_num(loads)))
-        self._weather.append(outdoor)
+        self._course.append((outdoor, float(shares @ np.nan_to_num(loads))))
         self._show()
         known = np.array([limit.knows(outdoor) for limit in limits])
         back = self._holds_back(held, loads, known, limits, outdoor)
         self._run = self._run + 1 if back else 0
         steps = self._run + 1  # the step before had the setpoints out of reach too
+        hour = max(round(_MEAN_OF[1] / self.step), 1)
         if back and steps * self.step >= _MEAN_OF[0]:
-            mean = float(np.mean([*self._totals][-min(steps, self._hour) :]))
+            mean = self._mean(min(steps, hour))
             if mean >= self.shown(np.array([outdoor]))[0]:
                 self._limit.learn(outdoor, mean)
-        elif len(self._totals) >= self._hour and self._limit.knows(outdoor):
+        elif len(self._course) >= hour and self._limit.knows(outdoor):
             # more than was thought possible, for an hour, is possible
-            mean = float(np.mean([*self._totals][-self._hour :]))
+            mean = self._mean(hour)
             if mean > self._limit.likely(np.array([outdoor]))[0]:
                 self._limit.learn(outdoor, mean)
         part = shares[wanted].sum() if wanted.sum() > 1 else 0.0
         return ~wanted if part >= _ALL or (part >= _SEVERAL and known[wanted].all()) else free
 
-    @property
-    def _hour(self) -> int:
-        """Steps of the longest mean."""
-        return max(round(_MEAN_OF[1] / self.step), 1)
+    def _mean(self, steps: int) -> float:
+        """Mean load of the last steps [-]."""
+        return float(np.mean([load for _, load in self._course][-steps:]))
 
     def _show(self) -> None:
         """Take what was given for two hours, in the mildest weather of them: of those in weather as hard, the most."""
-        if len(self._totals) < (self._totals.maxlen or 0):
+        count = len(self._course)
+        if count != self._course.maxlen:
             return
-        mean, outdoor = float(np.mean(self._totals)), max(self._weather)
+        mean, outdoor = self._mean(count), max(weather for weather, _ in self._course)
         if mean > self.shown(np.array([outdoor]))[0]:
             self._shown = [(w, load) for w, load in self._shown if w < outdoor or load > mean] + [(outdoor, mean)]
 

@@ -98,7 +98,7 @@ def test_rooms_lie_side_by_side(models: Callable[[str], ModuleType]) -> None:
     rooms = models("rooms").Rooms(3, 2, 5.0, 4.0, 3.0, (3.0, 2.0))
     assert rooms.names == ("SOUTHWEST", "SOUTHMIDDLE", "SOUTHEAST", "NORTHWEST", "NORTHMIDDLE", "NORTHEAST")
     assert rooms.outer == (3.0 * (6 * 5.0 + 4 * 4.0), 6 * 3.0 + 4 * 2.0) and rooms.area == 20.0
-    middle = rooms.box(4, rooms.names)
+    middle = rooms.box(4)
     behind = {name: face.get("outside_boundary_condition_object") for name, face in
               middle["BuildingSurface:Detailed"].items()}  # fmt: skip
     assert behind["NORTHMIDDLE south"] == "SOUTHMIDDLE north" and behind["NORTHMIDDLE east"] == "NORTHEAST west"

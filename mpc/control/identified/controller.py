@@ -144,7 +144,6 @@ class IdentifiedController:
         need_actuator("mpc", [m.machine.name for m in model.maps] + battery, actuators, every=True)
         model = model.bound(actuators)
         self.model, self.settings, self._location = model, settings or IdentifiedSettings(), location
-        self._actuators = {a.name: a for a in actuators}
         self._problem, self._observer = IdentifiedProblem(model, electric), GreyBoxObserver(model)
         self._planner = RunPlanner(self._problem.stage, round(WHOLE / model.step))
         self._meter = None if electric is None else ElectricMeter(electric, model)
@@ -376,7 +375,7 @@ class IdentifiedController:
 
     def _command(self, found: MachineMap, level: float) -> float:
         """Value of a machine's actuator for a level."""
-        actuator = self._actuators[found.machine.name]
+        actuator = found.machine.actuator
         low, high = actuator.lowest, actuator.highest
         if found.operation == "duty":
             return high if level > HALF else low

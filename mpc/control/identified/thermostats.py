@@ -108,8 +108,9 @@ class Thermostats:
         loads, missing = np.full(count, np.nan), np.full(count, -np.inf)
         for k in np.flatnonzero(self._is_led & np.isfinite(self._told)):
             found = self._model.maps[k]
-            if np.isfinite(found.machine.given(measurements)):
-                loads[k] = found.machine.given(measurements) / float(found.at(found.heat, 1.0, outdoor, REFERENCE))
+            given = found.machine.given(measurements)
+            if np.isfinite(given):
+                loads[k] = given / float(found.at(found.heat, 1.0, outdoor, REFERENCE))
                 missing[k] = self._told[k] - float(np.nanmean(end[self._served[k]]))
         full = np.array([found.above[1] for found in self._model.maps])
         alone = self._shared.learn(weather, loads, (loads > _IDLE) & out_of_reach(missing, full), self._limits)
