@@ -55,6 +55,21 @@ class HeatPump:
         """Water and air of the rating point, and ranges of water and of air [degC]."""
         return _RATED, _WATER, _AIR
 
+    def sheet(self, water: float) -> list[list[float | str]]:
+        """Return the most heat over outdoor air, or cold, from the rows of a data sheet [degC, W].
+
+        Parameters
+        ----------
+        water : float
+            That is supplied [degC].
+        """
+        (rated_water, rated_air), _, (low, high) = self.at
+        rows: list[list[float | str]] = []
+        for air in (low, 0.5 * (low + high), high):  # the capacity is linear
+            share = 1.0 + self.per_air * (air - rated_air) + self.per_water * (water - rated_water)
+            rows.append([f"{air:g} degC", round(self.capacity * share, -2)])
+        return rows
+
     def part_load(self) -> tuple[float, float, float]:
         """Coefficients of the electric input per heat over part load, EnergyPlus' order of ``Curve:Exponent``.
 

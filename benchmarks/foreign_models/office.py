@@ -23,6 +23,8 @@ _FAN = (80.0, 0.4)  # Pa and total efficiency [-]: 120 W a coil of 10 kW
 _PUMPS = 150.0 / 40_000.0  # W per W of the coils, each
 #: Own supply water: 45 degC at -10 degC outdoors, 35 at 15, on a straight line.
 RESET = (45.0, -10.0, 35.0, 15.0)
+#: Supply water of the data sheets [degC]: fan coils are laid out for it.
+_HOT_WATER, _COLD_WATER = RESET[0], 7.0
 NOBODY = [False] * 24
 _HEAT = "{} heat"  # of a fan coil: negative where it cools
 _HOT, _COLD, _UNIT = "Coil:Heating:Water", "Coil:Cooling:Water", "ZoneHVAC:FourPipeFanCoil"
@@ -106,7 +108,7 @@ def office(of: Office | None = None) -> Objects:
     machine, coils = ("HeatPump:PlantLoop:EIR:Heating", PUMP), (_HOT, "hot coil")
     ep.merge(model, _loop(of, "HOT LOOP", "Heating", machine, coils, 40.0))
     machine = ("DistrictCooling" if of.chiller is None else "HeatPump:PlantLoop:EIR:Cooling", _CHILLER)
-    ep.merge(model, _loop(of, "COLD LOOP", "Cooling", machine, (_COLD, "cold coil"), 7.0))
+    ep.merge(model, _loop(of, "COLD LOOP", "Cooling", machine, (_COLD, "cold coil"), _COLD_WATER))
     ep.merge(model, heat_pump(_CHILLER, of.chiller, of.flow) if of.chiller is not None else {
         "DistrictCooling": {_CHILLER: {
             "chilled_water_inlet_node_name": f"{_CHILLER} in", "chilled_water_outlet_node_name": f"{_CHILLER} out",
@@ -195,4 +197,5 @@ def description(of: Office | None = None) -> dict[str, Any]:
         "heat_pump/heating_power_sensor": f"{PUMP}, Heat Pump Load Side Heat Transfer Rate",
     }
     told["actuators"] |= acted
-    return told | {"energy": {"electricity": electricity}}
+    sheet = of.machine.sheet(_HOT_WATER) if of.chiller is None else of.chiller.sheet(_COLD_WATER)
+    return told | {"source": {"capacity": sheet}, "energy": {"electricity": electricity}}

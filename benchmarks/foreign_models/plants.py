@@ -83,6 +83,7 @@ def describe(name: str, errors: str = "day_ahead") -> dict[str, Any]:
         "zones": told["zones"],
         "measurements": told["measurements"] | station,
         "actuators": told["actuators"],
+        **({"source": told["source"]} if "source" in told else {}),
         "energy": told["energy"],
         "prices": {"electricity": "dynamic", "currency": "EUR"} | told.get("prices", {}),
         "series": ["prices.csv"],

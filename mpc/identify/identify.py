@@ -104,10 +104,14 @@ def identify(telemetry: PlantTelemetry, machines: Sequence[Machine], progress: P
     sign, law = machines[0].sign, np.array([found.above[1] for found in maps])
     alone, wanted = [pairs_as_heated(found.limits, sign) for found in maps], out_of_reach(above, law)
     outdoor = as_heated(loads.outdoor, sign)
-    held_back = shared_of(led_heat(maps), telemetry.step, outdoor, loads.level, wanted, alone)
+    whole = float(np.maximum(led_heat(maps), 0.0).sum())
+    sheet = tuple((at, heat / whole) for at, heat in telemetry.site.capacity)
+    held_back = shared_of(
+        led_heat(maps), telemetry.step, outdoor, loads.level, wanted, alone, pairs_as_heated(sheet, sign)
+    )
     notes = _notes(telemetry, machines, suns)
     shared = pairs_as_heated(held_back, sign)
-    model = PlantModel(telemetry.site.name, telemetry.step, box, maps, base | left, shared, source)
+    model = PlantModel(telemetry.site.name, telemetry.step, box, maps, base | left, shared, source, sheet)
     return Identified(model, telemetry, data, loads, tuple(errors), split, notes)
 
 

@@ -22,8 +22,8 @@ OUT_OF_REACH = 0.3
 _MEAN, _AT = 1.0, 280.15
 _LEVEL, _SLOPE, _SHAPE, _LENGTH, _READING = 0.2, 0.02, 0.2, 5.0, 0.05
 
-#: The same of a machine with a data sheet, whose capacity is the mean: certified ones are within 8 % (Eurovent), and
-#: air flow, defrost and ducts take some more. A step's outdoor air is told to half a kelvin [K].
+#: The same of a machine with a data sheet, whose capacity is the mean, as shares of it: certified ones are within 8 %
+#: (Eurovent), and air flow, defrost and ducts take some more. A step's outdoor air is told to half a kelvin [K].
 _SHEET_LEVEL, _SHEET_SHAPE, _TOLD = 0.1, 0.1, 0.5
 
 #: Medians of the fifths of a normal distribution, in standard deviations [-].
@@ -124,7 +124,7 @@ class HeatLimit:
         """Mean and standard deviation of the load, shape (n,) [-]."""
         expected: FloatArray = self._near(outdoor, error).mean(axis=0)
         level, slope, shape = self._spreads
-        variance = level**2 + (slope * (outdoor - _AT)) ** 2 + shape**2
+        variance = self._mean(outdoor) ** 2 * (level**2 + (slope * (outdoor - _AT)) ** 2 + shape**2)
         if not self._bins:
             return expected, np.sqrt(variance)
         at, load = np.array([*self._bins.values()]).T
@@ -152,7 +152,8 @@ class HeatLimit:
     def _kernel(self, a: FloatArray, b: FloatArray) -> FloatArray:
         level, slope, shape = self._spreads
         straight = level**2 + slope**2 * np.outer(a - _AT, b - _AT)
-        return np.asarray(straight + shape**2 * np.exp(-0.5 * ((a[:, None] - b) / _LENGTH) ** 2))
+        shares = straight + shape**2 * np.exp(-0.5 * ((a[:, None] - b) / _LENGTH) ** 2)
+        return np.asarray(np.outer(self._mean(a), self._mean(b)) * shares)
 
 
 def bin_of(outdoor: float) -> int:

@@ -309,6 +309,26 @@ def find_machines(
     return tuple(made)
 
 
+def check_terminals(machines: Sequence[Machine]) -> None:
+    """Refuse machines of which no data sheet of one source can say how much heat they give together.
+
+    Parameters
+    ----------
+    machines : sequence of Machine
+        That are controlled.
+
+    Raises
+    ------
+    PlantError
+        When there is only one, or one is no setpoint with measured heat.
+    """
+    fitting = [m.name for m in machines if m.role == "setpoint" and m.heat]
+    PlantError.unless(
+        len(fitting) == len(machines) > 1, "source.capacity", "two setpoints or more, whose heat is measured",
+        ", ".join(m.name for m in machines), "say the data sheet of a single machine as `capacity` of its setpoint",
+    )  # fmt: skip
+
+
 def _served(entity: str, zones: Sequence[str]) -> tuple[str, ...]:
     """Zones of an entity: the one of its name, or whose last word it ends in as ``fan_coil_north``; else all."""
     own = [z for z in zones if z == entity] or [z for z in zones if z.split("_")[-1] == entity.split("_")[-1]]

@@ -24,7 +24,7 @@ from mpc.loop.actuators import Actuator
 from thermal._types import FloatArray
 
 #: File of a model in its folder, and the version of its contents.
-FILE, FORMAT = "model.json", 6
+FILE, FORMAT = "model.json", 7
 
 #: A load that is none [-].
 _NOTHING = 1e-9
@@ -51,6 +51,9 @@ class PlantModel:
         load as a share of the sum of their full loads [-], see `SharedLimit`.
     source : Source or None
         What they buy together; None where each has a map of its own.
+    sheet : tuple of tuple of float
+        Of one source for all of them, by its data sheet: outdoor air [K], rising, and their largest load together as
+        such a share [-].
     """
 
     name: str
@@ -60,6 +63,7 @@ class PlantModel:
     base: Mapping[str, float] = field(default_factory=dict)
     shared: tuple[tuple[float, float], ...] = ()
     source: Source | None = None
+    sheet: tuple[tuple[float, float], ...] = ()
 
     @property
     def sign(self) -> float:
@@ -148,8 +152,8 @@ class PlantModel:
         ]  # fmt: skip
         return {
             "format": FORMAT, "name": self.name, "step": self.step, "grey_box": self.box.to_dict(), "machines": maps,
-            "base": dict(self.base), "shared": [list(pair) for pair in self.shared],
-            "source": None if self.source is None else asdict(self.source),
+            "base": dict(self.base), "source": None if self.source is None else asdict(self.source),
+            "shared": [list(pair) for pair in self.shared], "sheet": [list(pair) for pair in self.sheet],
         }  # fmt: skip
 
     @classmethod
@@ -171,9 +175,9 @@ class PlantModel:
         try:
             maps = tuple(_map_of(entry) for entry in content["machines"])
             box = GreyBox.from_dict(content["grey_box"])
-            shared = tuple((float(outdoor), float(load)) for outdoor, load in content["shared"])
+            shared, sheet = (tuple((float(t), float(load)) for t, load in content[key]) for key in ("shared", "sheet"))
             base, source = dict(content["base"]), _source_of(content["source"])
-            return cls(str(content["name"]), float(content["step"]), box, maps, base, shared, source)
+            return cls(str(content["name"]), float(content["step"]), box, maps, base, shared, source, sheet)
         except (KeyError, TypeError, ValueError, MpcError, CalibrationError) as error:
             raise ControlError(where, expected, f"{type(error).__name__}: {error}") from error
 

@@ -52,8 +52,9 @@ class SharedLimit:
     that cool, the colder), so that setpoints deep in the band are out of reach of what holds the edge of it.
 
     Until it has been seen, and in milder weather than that, machines are taken to have sources of their own: sources
-    are weakest in the cold, where most is asked of them. All machines are taken for one source's: where there are two,
-    and one of them is at its limit alone, too little is relied on until more is seen.
+    are weakest in the cold, where most is asked of them. A data sheet says it in any weather. All machines are taken
+    for one source's: where there are two, and one of them is at its limit alone, too little is relied on until more is
+    seen.
 
     Parameters
     ----------
@@ -63,6 +64,8 @@ class SharedLimit:
         Of the control [s].
     seen : iterable of tuple of float
         Outdoor air [K] and load [-] of steps at the limit.
+    sheet : sequence of tuple of float
+        Outdoor air [K], rising, and largest load [-] by a data sheet of the source, as of `HeatLimit`.
 
     Examples
     --------
@@ -75,6 +78,7 @@ class SharedLimit:
     weights: FloatArray
     step: float
     seen: InitVar[Iterable[tuple[float, float]]] = ()
+    sheet: Sequence[tuple[float, float]] = ()
     _limit: HeatLimit = field(init=False)
     _course: deque[tuple[float, float]] = field(init=False)
     _wanted: BoolArray = field(init=False)
@@ -82,7 +86,7 @@ class SharedLimit:
     _run: int = field(default=0, init=False)
 
     def __post_init__(self, seen: Iterable[tuple[float, float]]) -> None:
-        self._limit, self._course = HeatLimit(seen), deque(maxlen=max(round(_SHOWN / self.step), 1))
+        self._limit, self._course = HeatLimit(seen, self.sheet), deque(maxlen=max(round(_SHOWN / self.step), 1))
         self._wanted = np.zeros(self.weights.size, dtype=bool)
 
     @property
@@ -95,17 +99,21 @@ class SharedLimit:
         """Outdoor air [K], rising, and load [-] of steps at the limit."""
         return self._limit.readings
 
-    def at(self, outdoor: FloatArray) -> FloatArray:
-        """Load that is relied on, shape (n,) [-]; infinite where nothing has been seen.
+    def at(self, outdoor: FloatArray, error: FloatArray | float = 0.0) -> FloatArray:
+        """Load that is relied on, shape (n,) [-]; infinite where nothing is known.
 
         Parameters
         ----------
         outdoor : ndarray, shape (n,)
             Outdoor air [K].
+        error : ndarray, shape (n,), or float
+            Its standard deviation where it is forecast [K].
         """
-        if not self.readings:
+        if not self.readings and not self.sheet:
             return np.full(outdoor.shape, np.inf)
-        known = np.where(outdoor > self.readings[-1][0] + BIN, np.inf, self._limit.at(outdoor))
+        known = self._limit.at(outdoor, error)
+        if not self.sheet:
+            known = np.where(outdoor > self.readings[-1][0] + BIN, np.inf, known)
         return np.maximum(known, self.shown(outdoor))
 
     def shown(self, outdoor: FloatArray) -> FloatArray:
@@ -152,7 +160,7 @@ class SharedLimit:
             mean = self._mean(min(steps, hour))
             if mean >= self.shown(np.array([outdoor]))[0]:
                 self._limit.learn(outdoor, mean)
-        elif len(self._course) >= hour and self._limit.knows(outdoor):
+        elif len(self._course) >= hour and (self.sheet or self._limit.knows(outdoor)):
             # more than was thought possible, for an hour, is possible
             mean = self._mean(hour)
             if mean > self._limit.likely(np.array([outdoor]))[0]:
@@ -201,7 +209,7 @@ def shares_of(weights: FloatArray) -> FloatArray:
 
 def shared_of(
     weights: FloatArray, step: float, outdoor: FloatArray, loads: FloatArray, wanted: BoolArray,
-    limits: Sequence[Iterable[tuple[float, float]]],
+    limits: Sequence[Iterable[tuple[float, float]]], sheet: Sequence[tuple[float, float]] = (),
 ) -> tuple[tuple[float, float], ...]:  # fmt: skip
     """Find steps in telemetry at which machines gave all that there is for them: outdoor air [K], load of all [-].
 
@@ -219,8 +227,10 @@ def shared_of(
         Whether all that there is was asked for.
     limits : sequence of iterable of tuple of float
         Outdoor air [K] and load [-] of steps at which each machine alone was at its limit, see `HeatLimit`.
+    sheet : sequence of tuple of float
+        As of `SharedLimit`, outdoor air [K] and load [-].
     """
-    shared, alone = SharedLimit(weights, step), [HeatLimit(seen) for seen in limits]
+    shared, alone = SharedLimit(weights, step, (), sheet), [HeatLimit(seen) for seen in limits]
     for k in range(len(outdoor)):
         shared.learn(float(outdoor[k]), loads[k], wanted[k] & (loads[k] > RUNS), alone)
     return tuple((at, load) for at, load in shared.readings if load >= shared.shown(np.array([at]))[0])

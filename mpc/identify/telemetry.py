@@ -46,11 +46,15 @@ class Site:
         Floor area of each zone [m2].
     location : Location
         Where it stands.
+    capacity : tuple of tuple of float
+        Of one source that feeds all zones' terminals, by its data sheet: outdoor air [K], rising, and the most heat
+        that it gives there, or takes where it cools [W].
     """
 
     name: str
     areas: Mapping[str, float]
     location: Location
+    capacity: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,7 @@ from mpc.adapters.described.seen import seen_scenario
 from mpc.baselines.plants import FullSpeed
 from mpc.control.identified.controller import IdentifiedController, IdentifiedSettings
 from mpc.errors import ControlError, PlantError
-from mpc.identify.machines import Machine, find_machines
+from mpc.identify.machines import Machine, check_terminals, find_machines
 from mpc.identify.model import PlantModel
 from mpc.identify.telemetry import SET, PlantTelemetry, Site
 from mpc.loop.actuators import Actuator
@@ -89,7 +89,8 @@ class PlantStudy:
     def site(self) -> Site:
         """Zones and place."""
         file = self.description
-        return Site(file.name, {name: zone.floor_area for name, zone in file.zones.items()}, file.location)
+        areas = {name: zone.floor_area for name, zone in file.zones.items()}
+        return Site(file.name, areas, file.location, () if file.source is None else file.source.capacity)
 
     def plant(self) -> Any:
         """Make the plant, to be reset, and freed by leaving a ``with`` block."""
@@ -153,7 +154,10 @@ class PlantStudy:
         electric, told = electric_of(self.description), self.description.actuators
         of_machines = [a for a in actuators if electric is None or a.name != electric.command]
         sheets = {name: told[name].capacity for name in told}
-        return find_machines(of_machines, columns, zones, self.actuators, sheets, cooling=self.cooling)
+        found = find_machines(of_machines, columns, zones, self.actuators, sheets, cooling=self.cooling)
+        if self.description.source is not None:
+            check_terminals(found)
+        return found
 
     def seen_machines(self, seen: PlantTelemetry) -> tuple[Machine, ...]:
         """Actuators that are controlled, where there is telemetry: a real building has no program to ask.

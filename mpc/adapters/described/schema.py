@@ -5,7 +5,7 @@ from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from mpc.adapters.described.electric import ElectricEntry
 from mpc.adapters.described.programs import EnergyPlusProgram, ServerProgram, SiteProgram, UnitProgram
@@ -40,6 +40,14 @@ def _text(value: Any) -> Any:
     return value.isoformat() if hasattr(value, "isoformat") else value
 
 
+def _rising(pairs: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+    """Refuse a data sheet whose outdoor temperatures do not rise."""
+    outdoor = [pair[0] for pair in pairs]
+    if any(b <= a for a, b in pairwise(outdoor)):
+        raise ValueError(f"expected a capacity over rising outdoor temperatures, found {outdoor} K")
+    return pairs
+
+
 def _branch(value: Any) -> str | None:
     """Tell a number, a name and a table of hours apart."""
     if isinstance(value, bool) or (isinstance(value, str) and _NUMBER.fullmatch(value)):  # in quotes by mistake
@@ -72,6 +80,9 @@ Value = Annotated[
     ),
 ]  # fmt: skip
 Kelvin = Annotated[Number, BeforeValidator(_kelvin)]
+
+#: Outdoor temperatures, rising, and the most heat at each; on straight lines between them.
+DataSheet = Annotated[tuple[tuple[Kelvin, Positive], ...], AfterValidator(_rising)]
 
 
 class Signal(Entry):
@@ -108,27 +119,37 @@ class Input(Signal):
     release : str, optional
         Input that hands the actuator over while it is 1; ``X_activate`` of ``X_u`` by default where it is there.
     capacity : tuple of tuple of float
-        Of a setpoint: outdoor temperatures [K], rising, and the most heat that its machine gives at each, or takes
-        where it cools [W], as of a data sheet; on straight lines between them.
+        Of a setpoint, a data sheet: outdoor temperatures [K], rising, and the most heat that its machine gives at each,
+        or takes where it cools [W].
     """
 
     range: tuple[Kelvin, Kelvin] | None = None
     kind: Literal["continuous", "on_off", "modulating"] | None = None
     minimum: Number | None = None
     release: Text | None = None
-    capacity: tuple[tuple[Kelvin, Positive], ...] = ()
+    capacity: DataSheet = ()
 
     @model_validator(mode="after")
     def _fits(self) -> "Input":
-        outdoor = [pair[0] for pair in self.capacity]
-        if any(b <= a for a, b in pairwise(outdoor)):
-            raise ValueError(f"expected a capacity over rising outdoor temperatures, found {outdoor} K")
         if (self.kind == "modulating") != (self.minimum is not None):
             raise ValueError("expected a minimum of a modulating actuator, and of no other")
         return self
 
 
 Acted = Annotated[Input, BeforeValidator(_signal)]
+
+
+class SharedSource(Entry):
+    """One source for the terminals of all zones, such as a heat pump behind fan coils.
+
+    Parameters
+    ----------
+    capacity : tuple of tuple of float
+        Its data sheet: outdoor temperatures [K], rising, and the most heat that it gives at each, or takes where it
+        cools [W].
+    """
+
+    capacity: Annotated[DataSheet, Field(min_length=1)]
 
 
 class Comfort(Entry):
@@ -301,6 +322,8 @@ class PlantFile(Entry):
         Of each column ``ENTITY/POINT`` with a point type of the case format.
     actuators : mapping of str to Input
         Of each actuator ``ENTITY/POINT``.
+    source : SharedSource, optional
+        That feeds the terminals of all zones.
     energy : Energy
         What is bought.
     prices : Prices, optional
@@ -335,6 +358,7 @@ class PlantFile(Entry):
     zones: Annotated[dict[Text, Zone], Field(min_length=1)]
     measurements: dict[Text, Named] = Field(default_factory=dict)
     actuators: dict[Text, Acted] = Field(default_factory=dict)
+    source: SharedSource | None = None
     energy: Energy = Energy()
     prices: Prices | None = None
     emissions: Emissions | None = None

@@ -43,7 +43,8 @@ class Thermostats:
         self._model, self._sign = model, model.sign
         told = [[pairs_as_heated(pairs, self._sign) for pairs in (found.limits, found.sheet)] for found in model.maps]
         self._limits = [HeatLimit(limits, sheet) for limits, sheet in told]
-        self._shared = SharedLimit(model.led_heat, model.step, pairs_as_heated(model.shared, self._sign))
+        shared, sheet = (pairs_as_heated(pairs, self._sign) for pairs in (model.shared, model.sheet))
+        self._shared = SharedLimit(model.led_heat, model.step, shared, sheet)
         self._is_led = np.array([found.operation == "setpoint" for found in model.maps], dtype=bool)
         self._error = ForecastError(model.step)
         self._told, self._zone = np.full(len(model.maps), np.nan), np.full(len(model.box.zones), np.nan)
@@ -68,7 +69,7 @@ class Thermostats:
     def together(self, outdoor: FloatArray) -> FloatArray:
         """Largest load of all machines that are led by a setpoint, shape (N,): a share of their full loads [-].
 
-        Of all steps but the first a twentieth less than is relied on.
+        Of all steps but the first a twentieth less than is relied on; infinite where the machines reach no more alone.
 
         Parameters
         ----------
@@ -76,7 +77,9 @@ class Thermostats:
             Outdoor air that is forecast for the coming steps [K].
         """
         kept = np.where(np.arange(len(outdoor)) > 0, 1.0 - _RESERVE, 1.0)
-        return np.asarray(kept * self._shared.at(as_heated(outdoor, self._sign)))
+        weather, error = as_heated(outdoor, self._sign), self._error.ahead(len(outdoor))
+        limit = kept * self._shared.at(weather, error)
+        return np.where(limit < self.most(outdoor) @ self._shared.shares, limit, np.inf)
 
     def expect(self, outdoor: FloatArray) -> None:
         """Take a forecast, so that its error is known when its steps have come.
