@@ -19,7 +19,7 @@ from mpc.errors import PlantError
 from mpc.identify.curves import Curve
 from mpc.identify.excitation import Excitation, ExcitationSettings
 from mpc.identify.identify import identify
-from mpc.identify.machines import Machine, as_heated, find_machines
+from mpc.identify.machines import Machine, as_heated, find_machines, pairs_as_heated
 from mpc.identify.maps import MachineMap, OwnPower
 from mpc.identify.model import PlantModel
 from mpc.identify.telemetry import SET, PlantTelemetry, Site
@@ -47,7 +47,9 @@ def machine_of(room: str, sign: float, *, more: bool = False) -> Machine:
     return replace(found, power=f"{room}/{POWER}", beside=other) if more else found
 
 
-def model_of(sign: float, shared: tuple[tuple[float, float], ...] = ()) -> PlantModel:
+def model_of(
+    sign: float, shared: tuple[tuple[float, float], ...] = (), sheet: tuple[tuple[float, float], ...] = ()
+) -> PlantModel:
     """Two rooms with terminals of 4 kW, whose limits and common limit are those of the mirror."""
     heat, box = Curve({"command": 4000.0}, {}), {room: 40.0 for room in ROOMS}
     limits = tuple(sorted((as_heated(outdoor, sign), load) for outdoor, load in ((270.0, 0.9), (278.0, 1.0))))
@@ -57,8 +59,8 @@ def model_of(sign: float, shared: tuple[tuple[float, float], ...] = ()) -> Plant
         for room in ROOMS
     )  # fmt: skip
     network = GreyBox.start(box, (), {m.machine.name: m.machine.serves for m in maps}, (True, True))
-    common = tuple(sorted((as_heated(outdoor, sign), load) for outdoor, load in shared))
-    return PlantModel("rooms", STEP, network, maps, shared=common)
+    common = [pairs_as_heated(pairs, sign) for pairs in (shared, sheet)]
+    return PlantModel("rooms", STEP, network, maps, shared=common[0], sheet=common[1])
 
 
 def forecast_of(sign: float, outdoor: FloatArray, begin: str = "2023-01-09 05:15") -> pd.DataFrame:
@@ -81,8 +83,11 @@ def seen_of(sign: float, second: int, zones: FloatArray, heats: FloatArray, outd
     )
 
 
+@pytest.mark.parametrize(
+    "sheet", [(), ((258.0, 0.3), (273.0, 0.65), (288.0, 1.0))], ids=["no data sheet", "a data sheet"]
+)
 @pytest.mark.parametrize("electric", [None, Electric(demand=2.0)])
-def test_a_controller_that_cools_does_what_one_that_heats_does_in_the_mirror(electric: Electric | None) -> None:
+def test_a_controller_that_cools_does_what_one_that_heats_does_in_the_mirror(electric: Electric | None, sheet) -> None:
     rng = np.random.default_rng(3)
     outdoor = 273.0 + 5.0 * np.sin(np.arange(80) / 12.0)
     zones = 293.0 + np.cumsum(rng.normal(0.0, 0.25, (20, 2)), axis=0)
@@ -90,7 +95,7 @@ def test_a_controller_that_cools_does_what_one_that_heats_does_in_the_mirror(ele
     told, kept = {}, {}
     rules: dict[float, list[tuple[float, ...]]] = {1.0: [], -1.0: []}
     for sign in (1.0, -1.0):
-        model = model_of(sign, ((272.0, 0.7),))
+        model = model_of(sign, ((272.0, 0.7),), sheet)
         there = [a for m in model.maps for a in (m.machine.actuator, m.machine.beside) if a is not None]
         controller = IdentifiedController(model, tuple(there), PLACE, electric=electric)
         forecast = forecast_of(sign, outdoor)

@@ -15,7 +15,7 @@ from mpc.control.identified.thermostats import Thermostats
 from mpc.errors import PlantError
 from mpc.identify.curves import Curve
 from mpc.identify.limits import HeatLimit
-from mpc.identify.machines import Machine, find_machines
+from mpc.identify.machines import Machine, check_terminals, find_machines
 from mpc.identify.maps import MachineMap, map_machines
 from mpc.identify.model import PlantModel
 from mpc.identify.regression import Loads
@@ -117,6 +117,14 @@ def test_a_data_sheet_is_of_a_setpoint_whose_heat_is_measured() -> None:
     assert found.capacity == sheet[NAME]
     with pytest.raises(PlantError, match="capacity: expected a setpoint whose heat is measured, found no heat"):
         find_machines([thermostat], [], ["room"], (), sheet)
+
+
+def test_a_data_sheet_of_one_source_is_of_several_setpoints_whose_heat_is_measured() -> None:
+    machines = [replace(led().maps[0].machine, heat=f"{room}/heating_power_sensor") for room in ("north", "south")]
+    check_terminals(machines)
+    for refused in (machines[:1], [machines[0], replace(machines[1], heat="")]):
+        with pytest.raises(PlantError, match="source.capacity: expected two setpoints or more, whose heat is measured"):
+            check_terminals(refused)
 
 
 def test_limits_are_read_from_the_steps_at_which_more_was_wanted() -> None:

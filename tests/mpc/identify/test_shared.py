@@ -143,6 +143,27 @@ def test_what_was_given_in_harder_weather_is_no_limit() -> None:
     assert before == after == ()  # also where it is seen afterwards
 
 
+def test_a_data_sheet_says_what_a_source_has_in_weather_that_was_never_seen() -> None:
+    sheet, limits = ((253.0, 0.3), (283.0, 0.9)), [HeatLimit(), HeatLimit()]
+    shared, every = SharedLimit(np.full(2, FULL), STEP, (), sheet), np.ones(2, dtype=bool)
+    weather = np.array([243.0, 253.0, 268.0, 290.0])
+    assert shared.at(weather) == pytest.approx([0.3, 0.3, 0.6, 0.9])
+    assert 0.3 < shared.at(weather, 3.0)[1] < 0.33  # as likely warmer as colder, and no less when colder
+    for _ in range(6):  # a sixth less than it says
+        shared.learn(268.0, np.full(2, 0.5), every, limits)
+    less = shared.at(weather) / np.array([0.3, 0.3, 0.6, 0.9])
+    assert 0.75 < less[2] < 0.87 and less[[0, 1, 3]] == pytest.approx(less[0], abs=0.02) and less[0] < less[2]
+    risen = []
+    for _ in range(2):  # more, an hour each, in weather of which nothing else was seen
+        for _ in range(4):
+            shared.learn(253.0, np.full(2, 0.35), ~every, limits)
+        risen.append(float(shared.at(weather)[1]))
+    assert 0.3 * less[1] + 0.02 < risen[0] < risen[1] == pytest.approx(0.35)
+    model = replace(_office(), shared=(), sheet=((253.0, 0.3), (283.0, 1.5)))
+    ahead = Thermostats(model).together(np.array([253.0, 253.0, 283.0]))
+    assert ahead[0] > ahead[1] > 0.3 * 0.95 and ahead[0] < 0.33 and np.isinf(ahead[2])  # terminals alone reach 1
+
+
 def test_telemetry_tells_what_the_controller_would_have_learned() -> None:
     outdoor, begun = np.full(8, 263.0), np.arange(8)[:, None] >= 4
     loads, wanted = np.where(begun, 0.7, 0.1) * np.ones(4), begun & (np.arange(4) < 3)
