@@ -82,7 +82,7 @@ def identify(telemetry: PlantTelemetry, machines: Sequence[Machine], progress: P
     data = _data(telemetry, machines)
     suns = tuple(telemetry.suns)
     serves = {machine.name: machine.serves for machine in machines}
-    metered = tuple(bool(machine.heat) for machine in machines)
+    metered = tuple(bool(machine.meter) for machine in machines)
     start = GreyBox.start(telemetry.site.areas, suns, serves, metered)
     held = round(max(2.0, _HELD_OUT * days) * 86_400.0 / telemetry.step)
     split = len(data.zone) - held
@@ -94,7 +94,7 @@ def identify(telemetry: PlantTelemetry, machines: Sequence[Machine], progress: P
     loads = _loads(telemetry, machines, data, box)
     signals = np.column_stack([machine.signal(telemetry) for machine in machines])
     bought = {name: telemetry.column(name) for name in CARRIERS if name in telemetry.frame}
-    own = [telemetry.column(m.power) if m.power and m.heat else None for m in machines]
+    own = [telemetry.column(m.power) if m.power and m.meter else None for m in machines]
     above = _above(telemetry, machines)
     maps, base = map_machines(machines, loads, signals, bought, above, own)
     source, left = find_source(loads, bought, maps, round(86_400.0 / telemetry.step))
@@ -117,13 +117,13 @@ def identify(telemetry: PlantTelemetry, machines: Sequence[Machine], progress: P
 
 def _measured(machine: Machine, telemetry: PlantTelemetry) -> Machine:
     """Leave out a sensor of heat that a machine which cools does not move: it is that of what heats the zone."""
-    if machine.sign > 0.0 or not machine.heat or telemetry.column(machine.heat).min() < -1.0:
+    if machine.sign > 0.0 or not machine.meter or machine.metered_heat(telemetry.column).min() < -1.0:
         return machine
     PlantError.unless(
-        machine.power, f"telemetry: {machine.heat}", "negative heat while the zone is cooled", "none below -1 W",
+        machine.power, f"telemetry: {machine.meter}", "negative heat while the zone is cooled", "none below -1 W",
         "measure what its cooling takes, or name the cooling's power in `measurements`",
     )  # fmt: skip
-    return replace(machine, heat="")
+    return replace(machine, heat="", air=())
 
 
 def _data(telemetry: PlantTelemetry, machines: Sequence[Machine]) -> GreyBoxData:
@@ -164,7 +164,7 @@ def _above(telemetry: PlantTelemetry, machines: Sequence[Machine]) -> FloatArray
 def _notes(telemetry: PlantTelemetry, machines: Sequence[Machine], suns: Sequence[str]) -> tuple[str, ...]:
     notes = []
     for machine in machines:
-        if not machine.heat:
+        if not machine.meter:
             notes.append(f"no heat of {machine.name} is measured: it is counted in watts of what is bought at 7 degC")
         told = [telemetry.frame[c] for c in (f"{SET}{machine.name}", machine.name) if c in telemetry.frame]
         if machine.role == "machine" and all(values.isna().all() for values in told):

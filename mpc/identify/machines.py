@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -14,7 +14,8 @@ from mpc.errors import PlantError
 from mpc.identify.telemetry import SET, PlantTelemetry
 from mpc.loop.actuators import COOLING_SETPOINT, HEATING_SETPOINT, Actuator
 from thermal._types import FloatArray
-from thermal.case.points import HEATING_POWER
+from thermal.case.points import DISCHARGE_TEMPERATURE, HEATING_POWER, SUPPLY_FLOW, ZONE_TEMPERATURE
+from thermal.units import AIR_HEAT_CAPACITY
 
 #: A command of a machine, or the setpoint of a zone's own controller.
 Role = Literal["machine", "setpoint"]
@@ -24,6 +25,9 @@ _HELPERS = re.compile(r"(^|_)(fan|pump|valve|damper)(_|$)")
 
 #: Powers of a machine itself, in the order of choice where its heat is not measured.
 _POWERS = ("electrical_power_sensor", "gas_power_sensor")
+
+#: Temperature of the air that a zone is supplied with, where it is not told as that of a terminal's discharge.
+_SUPPLY_TEMPERATURE = "supply_air_temperature_sensor"
 
 #: Kelvins between the setpoints of heating and cooling of a zone that are told together, so that neither works against
 #: the other: EnergyPlus stops where they cross, and thermostats of dead band control keep a kelvin or more.
@@ -88,6 +92,9 @@ class Machine:
         Of a setpoint whose machine has a data sheet: outdoor air [K], rising, and the most heat there [W].
     beside : Actuator or None
         Of a setpoint of heating that of cooling of the same zone, and the other way round, where there is one.
+    air : tuple of str
+        Where no column has its heat: those of the flow of its supply air, of that air's temperature and of the zone's;
+        empty where these are not measured either.
     """
 
     actuator: Actuator
@@ -97,6 +104,7 @@ class Machine:
     power: str = ""
     capacity: tuple[tuple[float, float], ...] = ()
     beside: Actuator | None = None
+    air: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -169,6 +177,26 @@ class Machine:
         beside = None if self.beside is None else actuators.get(self.beside.name)
         return replace(self, actuator=actuators[self.name], beside=beside)
 
+    @property
+    def meter(self) -> str:
+        """Column of its heat, or of the flow of its supply air; empty where neither is measured."""
+        return self.heat or (self.air[0] if self.air else "")
+
+    def metered_heat(self, of: Callable[[str], Any]) -> Any:
+        """Give the heat into its zones by what is measured, negative where it cools [W].
+
+        That of supply air is its flow times 1006 J/kg/K times how much warmer it is than the zone, as in case folders.
+
+        Parameters
+        ----------
+        of : callable
+            Called with a column, gives what it measures [W], [kg/s] or [K]: numbers or arrays.
+        """
+        if self.heat:
+            return of(self.heat)
+        flow, supply, zone = (of(column) for column in self.air)
+        return AIR_HEAT_CAPACITY * flow * (supply - zone)
+
     def signal(self, telemetry: PlantTelemetry) -> FloatArray:
         """Heat that it gives, or takes where it cools, or what is bought in its place, shape (n_time,) [W].
 
@@ -177,8 +205,8 @@ class Machine:
         telemetry : PlantTelemetry
             Of the plant.
         """
-        if self.heat:
-            return self.sign * telemetry.column(self.heat)
+        if self.meter:
+            return np.asarray(self.sign * self.metered_heat(telemetry.column))
         if self.power:
             return telemetry.column(self.power)
         bought = telemetry.bought
@@ -192,9 +220,11 @@ class Machine:
         measurements : mapping of str to float
             Of the step [W].
         """
-        column = self.heat or self.power
-        value = measurements[column] if column in measurements else np.nan
-        return float(self.sign * value if self.heat else value)
+
+        def of(column: str) -> float:
+            return measurements[column] if column in measurements else np.nan
+
+        return float(self.sign * self.metered_heat(of) if self.meter else of(self.power))
 
     def level(self, telemetry: PlantTelemetry) -> FloatArray:
         """Load as a share of full load, shape (n_time,) [-]; NaN while nothing says it.
@@ -244,8 +274,8 @@ def find_machines(
 ) -> tuple[Machine, ...]:
     """Choose the actuators that are controlled: commands of machines, else setpoints of zones.
 
-    Fans, pumps, valves and dampers are left to the plant where it has other machines: they follow these. All of them
-    heat, or all cool; the other is left to the plant.
+    Fans, pumps, valves and dampers are chosen where there is nothing else: they follow what the plant's own control
+    does. All that is chosen heats, or all cools; the other is left to the plant.
 
     Parameters
     ----------
@@ -278,7 +308,7 @@ def find_machines(
     main = [name for name in commands if not _HELPERS.search(points[name])]
     chosen, expected = [*wanted], f"a {COOLING_SETPOINT}"
     if not wanted:
-        chosen = setpoints[COOLING_SETPOINT] if cooling else main or commands or setpoints[HEATING_SETPOINT]
+        chosen = setpoints[COOLING_SETPOINT] if cooling else main or setpoints[HEATING_SETPOINT] or commands
     if not cooling:
         expected = f"a command of a machine, or a {HEATING_SETPOINT}"
     PlantError.unless(chosen, "actuators", expected, ", ".join(by_name) or "none")
@@ -293,19 +323,22 @@ def find_machines(
         role: Role = "setpoint" if any(name in kind for kind in setpoints.values()) else "machine"
         own = [c for c in heats if c.rpartition("/")[0] == entity]
         heat = own[0] if own else heats[0] if len(heats) == len(chosen) == 1 else ""
+        air = () if heat or role == "machine" else _air_of(entity, columns)
         entities = (entity, heat.rpartition("/")[0])
         power = next((f"{e}/{p}" for e in entities if e for p in _POWERS if f"{e}/{p}" in columns), "")
         PlantError.unless(
-            heat or power or len(chosen) == 1, f"actuator {name}", f"a sensor {entity}/{HEATING_POWER} or {_POWERS[0]}",
-            "none", "add it to `measurements`, so that machines can be told apart",
+            heat or air or power or len(chosen) == 1, f"actuator {name}",
+            f"a sensor {entity}/{HEATING_POWER} or {_POWERS[0]}", "none",
+            f"add it to `measurements`, or {SUPPLY_FLOW} and {DISCHARGE_TEMPERATURE}, so that machines can be told apart",
         )  # fmt: skip
         PlantError.unless(
-            name not in sheets or (role == "setpoint" and heat), f"actuators.{name}.capacity",
+            name not in sheets or (role == "setpoint" and (heat or air)), f"actuators.{name}.capacity",
             "a setpoint whose heat is measured", "a command" if role == "machine" else "no heat",
         )  # fmt: skip
         kinds = [kind for kind in setpoints if kind != points[name]] if role == "setpoint" else []
         beside = next((by_name[f"{entity}/{kind}"] for kind in kinds if f"{entity}/{kind}" in by_name), None)
-        made.append(Machine(by_name[name], role, _served(entity, zones), heat, power, sheets.get(name, ()), beside))
+        of = (heat, power, sheets.get(name, ()), beside, air)
+        made.append(Machine(by_name[name], role, _served(entity, zones), *of))
     return tuple(made)
 
 
@@ -322,11 +355,19 @@ def check_terminals(machines: Sequence[Machine]) -> None:
     PlantError
         When there is only one, or one is no setpoint with measured heat.
     """
-    fitting = [m.name for m in machines if m.role == "setpoint" and m.heat]
+    fitting = [m.name for m in machines if m.role == "setpoint" and m.meter]
     PlantError.unless(
         len(fitting) == len(machines) > 1, "source.capacity", "two setpoints or more, whose heat is measured",
         ", ".join(m.name for m in machines), "say the data sheet of a single machine as `capacity` of its setpoint",
     )  # fmt: skip
+
+
+def _air_of(zone: str, columns: Sequence[str]) -> tuple[str, ...]:
+    """Columns of a zone's supply air and its own: flow and temperatures; nothing where one is not measured."""
+    supplies = [f"{zone}/{point}" for point in (DISCHARGE_TEMPERATURE, _SUPPLY_TEMPERATURE)]
+    supply = next((column for column in supplies if column in columns), "")
+    found = (f"{zone}/{SUPPLY_FLOW}", supply, f"{zone}/{ZONE_TEMPERATURE}")
+    return found if all(column in columns for column in found) else ()
 
 
 def _served(entity: str, zones: Sequence[str]) -> tuple[str, ...]:

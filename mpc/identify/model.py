@@ -186,9 +186,8 @@ def _map_of(entry: Mapping[str, Any]) -> MachineMap:
     told = entry["machine"]
     sheet = tuple((float(outdoor), float(heat)) for outdoor, heat in told["capacity"])
     beside = None if told["beside"] is None else Actuator(**told["beside"])
-    machine = Machine(
-        Actuator(**told["actuator"]), told["role"], tuple(told["serves"]), told["heat"], told["power"], sheet, beside
-    )
+    of = told["heat"], told["power"], sheet, beside, tuple(told["air"])
+    machine = Machine(Actuator(**told["actuator"]), told["role"], tuple(told["serves"]), *of)
     powers = {kind: Curve(**curve) for kind, curve in entry["powers"].items()}
     limits = tuple((float(outdoor), float(load)) for outdoor, load in entry["limits"])
     heat, above = Curve(**entry["heat"]), tuple(entry["above"])

@@ -229,7 +229,7 @@ _Term = tuple[str, str, str, float, tuple[float, float]]
 
 def _terms(m: MachineMap) -> list[_Term]:
     """List the coefficients of a machine."""
-    return _terms_of(m.machine.name, {"heat" if m.machine.heat else "heat, in what is bought": m.heat, **m.powers})
+    return _terms_of(m.machine.name, {"heat" if m.machine.meter else "heat, in what is bought": m.heat, **m.powers})
 
 
 def _source_terms(source: Source) -> list[_Term]:
@@ -267,7 +267,7 @@ def _content(found: Identified, made: Experiment | None, command: str) -> dict[s
     machines = [
         (m.machine.name, _OPERATION[m.operation],
          listed(m.machine.serves) if len(m.machine.serves) < 5 else "all zones",
-         m.machine.heat or "not measured", significant(m.standing, 2) if m.standing > _SEEN else "0",
+         m.machine.meter or "not measured", significant(m.standing, 2) if m.standing > _SEEN else "0",
          *("of the source" if found.model.source is not None else significant(m.efficiency(u), 3) for u in (1.0, 0.5)))
         for m in found.model.maps
     ]  # fmt: skip

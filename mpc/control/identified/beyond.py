@@ -107,7 +107,7 @@ class PowerLearner:
                 continue
             if found.operation == "setpoint":  # its zone's own controller chose the load
                 full = float(found.at(found.heat, 1.0, outdoor, emitter[k]))
-                load = machine.given(measurements) / full if machine.heat else np.nan
+                load = machine.given(measurements) / full if machine.meter else np.nan
             ratio = found.ratio(measurements[machine.power], load, outdoor, float(emitter[k]))
             if np.isfinite(load) and np.isfinite(ratio):
                 correction.learn(outdoor, load, ratio)

@@ -90,8 +90,8 @@ class GreyBoxObserver:
         """
         model, space = self.model, self._whole.space
         outdoor = self.outdoor(measurements, before)
-        columns = [found.machine.heat for found in model.maps]
-        told = np.array([measurements[column] if column in measurements else np.nan for column in columns])
+        machines = [found.machine for found in model.maps]
+        told = np.array([m.sign * m.given(measurements) if m.meter else np.nan for m in machines])
         heat = np.where(np.isfinite(told), told, model.heat(self.state, levels, outdoor))
         given = model.box.delivered(heat, np.asarray(outdoor))
         u = np.concatenate([[outdoor - REFERENCE], before.sun[0], given, before.gain[0]])

@@ -28,7 +28,7 @@ from mpc.loop.plant import Measurements, PointLayout
 from mpc.scenario.forecast import Forecast
 from thermal._types import FloatArray
 from thermal.case.building import Location
-from thermal.case.points import HEATING_POWER, OUTDOOR_TEMPERATURE, ZONE_TEMPERATURE
+from thermal.case.points import HEATING_POWER, OUTDOOR_TEMPERATURE, SUPPLY_FLOW, ZONE_TEMPERATURE
 
 ROOMS, STEP, POWER = ("south", "north"), 900.0, "electrical_power_sensor"
 PLACE = Location(latitude=50.8, longitude=4.35, elevation=100.0, timezone="Etc/GMT-1")
@@ -178,6 +178,28 @@ def test_what_is_identified_of_cooling_is_that_of_heating_in_the_mirror(recorded
         assert len(a.limits) > 1 and b.heat.coefficients["command"] > 2000.0
     assert float(cooled.model.heat(np.zeros((1, 4)), np.ones((1, 1)), 303.15)[0, 0]) < -2000.0
     assert PlantModel.from_dict(cooled.model.to_dict()).sign == -1.0
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("point", ["discharge_air_temperature_sensor", "supply_air_temperature_sensor"])
+def test_heat_of_supply_air_is_as_good_as_a_meter(recorded: dict[str, FloatArray], sign: float, point: str) -> None:
+    """Of a terminal whose flow and temperature are measured, as of VAV boxes: 1006 J/kg/K by ASHRAE's handbook."""
+    telemetry = telemetry_of(sign, recorded)
+    flow = 0.2 + 0.1 * (recorded["heat"] > 1000.0)
+    heat, zone = telemetry.frame[f"south/{HEATING_POWER}"], telemetry.frame[f"south/{ZONE_TEMPERATURE}"]
+    air = {f"south/{SUPPLY_FLOW}": flow, f"south/{point}": zone + heat / (1006.0 * flow)}
+    by_air = replace(telemetry, frame=telemetry.frame.drop(columns=f"south/{HEATING_POWER}").assign(**air))
+    columns = [str(c) for c in by_air.frame if not str(c).startswith(SET)]
+    there = [Actuator(setpoint_of("south", sign), "K", 280.0, 306.3)]
+    (machine,) = find_machines(there, columns, ["south"], cooling=sign < 0.0)
+    assert machine.heat == "" and machine.meter == f"south/{SUPPLY_FLOW}"
+    found, metered = identify(by_air, [machine]), identify(telemetry, [machine_of("south", sign)])
+    np.testing.assert_allclose(found.loads.level, metered.loads.level, atol=1e-9)
+    np.testing.assert_allclose(found.model.maps[0].limits, metered.model.maps[0].limits)
+    again = PlantModel.from_dict(found.model.to_dict()).maps[0].machine
+    layout = PointLayout(again.air, "Etc/GMT-1")
+    assert again.given(Measurements(layout, 0, [0.2, 293.0 + sign * 5.0, 293.0])) == pytest.approx(1006.0)
+    assert np.isnan(again.given(Measurements(PointLayout(again.air[:2], "Etc/GMT-1"), 0, [0.2, 300.0])))
 
 
 def test_setpoints_of_cooling_are_chosen_when_they_are_asked_for() -> None:

@@ -83,8 +83,10 @@ def test_which_actuators_are_controlled() -> None:
         ("house",),
         "heat_pump/heating_power_sensor",
     )
-    (pump,) = find_machines(house[2:], ["x/heating_power_sensor"], ["house"])
+    (pump,) = find_machines(house[2:3], ["x/heating_power_sensor"], ["house"])
     assert pump.name == "floor/pump" and pump.heat == "x/heating_power_sensor"
+    (zone,) = find_machines(house[1:], ["x/heating_power_sensor"], ["house"])  # fan and pump follow its thermostat
+    assert zone.name == "house/zone_air_heating_temperature_setpoint" and zone.meter == "x/heating_power_sensor"
     coils = [actuator("fan_coil_north/on"), actuator("fan_coil_south/on")]
     powers = [f"{a.name.partition('/')[0]}/electrical_power_sensor" for a in coils]
     assert [m.serves for m in find_machines(coils, powers, ["north", "south"])] == [("north",), ("south",)]
