@@ -329,7 +329,7 @@ def find_machines(
         PlantError.unless(
             heat or air or power or len(chosen) == 1, f"actuator {name}",
             f"a sensor {entity}/{HEATING_POWER} or {_POWERS[0]}", "none",
-            f"add it to `measurements`, or {SUPPLY_FLOW} and {DISCHARGE_TEMPERATURE}, so that machines can be told apart",
+            f"add it to `measurements`, or {SUPPLY_FLOW} and {DISCHARGE_TEMPERATURE}: machines have to be told apart",
         )  # fmt: skip
         PlantError.unless(
             name not in sheets or (role == "setpoint" and (heat or air)), f"actuators.{name}.capacity",

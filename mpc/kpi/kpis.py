@@ -62,8 +62,6 @@ class MeasuredRun:
         Step of the scenario in which the run began.
     co2_limit : float
         Upper limit of carbon dioxide as a share of volume, such as 1e-3 [-]; needed where the plant simulates it.
-    district_price, district_carbon : float
-        Price [currency/kWh] and emissions [kg/kWh] of district heating; needed where the plant has it.
     control_step : float
         Time between actions [s]; default the scenario's step.
 
@@ -77,8 +75,6 @@ class MeasuredRun:
     scenario: Scenario
     first_step: int = 0
     co2_limit: float | None = None
-    district_price: float | None = None
-    district_carbon: float | None = None
     control_step: float | None = None
 
     def __post_init__(self) -> None:
@@ -92,8 +88,8 @@ class MeasuredRun:
         MpcError.unless(within, "record", f"steps within the scenario's {grid.n_steps}", f"{first} to {last:g}")
         found = f"{record.zone_temperature.shape[1]}"
         MpcError.unless(found == f"{zones}", "record: zone_temperature", f"{zones} zones", found)
-        priced = self.district_price is not None and (not counted or self.district_carbon is not None)
-        known = record.district_heating is None or priced
+        price, carbon = self.scenario.district_price, self.scenario.district_carbon
+        known = record.district_heating is None or (price is not None and (not counted or carbon is not None))
         MpcError.unless(known, "district heating", "its price, and its emissions where they count", "none")
         limited = record.co2 is None or 0 < (self.co2_limit or 0.0) < 1
         MpcError.unless(limited, "co2_limit", "a share of volume, such as 1e-3", self.co2_limit)
@@ -118,14 +114,16 @@ class MeasuredRun:
         rows = zip(self.scenario.zones, np.array(columns).T.tolist(), strict=True)
         return tuple(ZoneComfort(zone, *row) for zone, row in rows)
 
-    def energy(self, electricity: FloatArray | float, gas: FloatArray | float, district: float | None) -> float:
+    def energy(
+        self, electricity: FloatArray | float, gas: FloatArray | float, district: FloatArray | float | None
+    ) -> float:
         """Energy over the run, each carrier times a factor per kilowatt-hour, per floor area [unit of the factor/m2].
 
         Parameters
         ----------
         electricity, gas : float or ndarray, shape (n,)
             Factor [1/kWh], the same always or of each step.
-        district : float or None
+        district : float, ndarray, shape (n,), or None
             That of district heating [1/kWh]; counted where the plant has it.
         """
         powers = (self.record.electricity, self.record.gas, self.record.district_heating)
@@ -180,13 +178,17 @@ def _air(run: MeasuredRun) -> float | None:
 
 
 def _cost(run: MeasuredRun) -> float:
-    prices = run.scenario.electricity_price[run.rows], run.scenario.gas_price[run.rows]
-    return run.energy(*prices, run.district_price)
+    scenario, rows = run.scenario, run.rows
+    district = None if scenario.district_price is None else scenario.district_price[rows]
+    return run.energy(scenario.electricity_price[rows], scenario.gas_price[rows], district)
 
 
 def _emissions(run: MeasuredRun) -> float | None:
-    carbons = run.scenario.electricity_carbon[run.rows], run.scenario.gas_carbon[run.rows]
-    return run.energy(*carbons, run.district_carbon) if run.scenario.carbon_kind else None
+    scenario, rows = run.scenario, run.rows
+    if not scenario.carbon_kind:
+        return None
+    district = None if scenario.district_carbon is None else scenario.district_carbon[rows]
+    return run.energy(scenario.electricity_carbon[rows], scenario.gas_carbon[rows], district)
 
 
 def _time_ratio(run: MeasuredRun) -> float | None:
@@ -350,8 +352,6 @@ def measure_kpis(
         Step of the scenario in which the run began.
     co2_limit : float
         Upper limit of carbon dioxide as a share of volume, such as 1e-3 [-]; needed where the plant simulates it.
-    district_price, district_carbon : float
-        Price [currency/kWh] and emissions [kg/kWh] of district heating; needed where the plant has it.
     control_step : float
         Time between actions [s]; default the scenario's step.
 
@@ -365,7 +365,7 @@ def measure_kpis(
     MpcError
         When the record does not fit the scenario, or a limit or price is needed.
     """
-    run = MeasuredRun(record, scenario, first_step, co2_limit, district_price, district_carbon, control_step)
+    run = MeasuredRun(record, scenario, first_step, co2_limit, control_step)
     values: dict[str, Any] = {name: indicator.function(run) for name, indicator in KPIS.items()}
     own = {name: values.pop(name) for name in tuple(values) if name not in Kpis.__dataclass_fields__}
     return Kpis(

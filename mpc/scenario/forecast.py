@@ -23,8 +23,10 @@ from thermal.units import QUANTITIES, to_si
 FORECAST_UNITS = {
     "electricity_price": "1/kWh",
     "gas_price": "1/kWh",
+    "district_heating_price": "1/kWh",
     "electricity_carbon_intensity": "kg/kWh",
     "gas_carbon_intensity": "kg/kWh",
+    "district_heating_carbon_intensity": "kg/kWh",
     "internal_gain": "W",
     "comfort_lower_temperature": "K",
     "comfort_upper_temperature": "K",

@@ -62,6 +62,8 @@ class Scenario:
         Heat in the zones that nobody measures or foresees, drawn or as it was [W]; none by default.
     seed : int
         Of that heat.
+    district_price, district_carbon : ndarray, shape (n_steps,), optional
+        Price [currency/kWh] and emissions [kg/kWh] of district heating; needed where the plant has it.
     """
 
     building: Building
@@ -84,6 +86,8 @@ class Scenario:
     heat: InternalGains
     unmeasured: DisturbanceModel | FloatArray | None = None
     seed: int = 0
+    district_price: FloatArray | None = None
+    district_carbon: FloatArray | None = None
 
     def redrawn(self, seed: int) -> Scenario:
         """Let other people and unmeasured heat come and go, as for the next episode of a training; all else stays.
@@ -152,6 +156,8 @@ class Scenario:
             "electricity_carbon_intensity": self.electricity_carbon,
             "gas_carbon_intensity": self.gas_carbon,
         }
+        district = {"price": self.district_price, "carbon_intensity": self.district_carbon}
+        columns |= {f"district_heating_{name}": values for name, values in district.items() if values is not None}
         of_zones = {
             OCCUPANCY_POINT: self.expected_occupancy if expected else self.occupancy,
             "internal_gain": self.expected_gains if expected else self.gains,
@@ -214,6 +220,7 @@ def build_scenario(
     people = occupancy or ScheduledOccupancy(dict(zip(zones, areas / OFFICE_AREA_PER_PERSON, strict=True)))
     bands = [_band(comfort, zone).on(grid) for zone in zones]
     emitted = carbon or CarbonIntensity(ConstantRate(0.0), "average", ConstantRate(0.0))
+    district = [None if rate is None else rate.on(grid) for rate in (tariff.district_heating, emitted.district_heating)]
     return Scenario(
         building, grid, areas, people.people(zones), here,
         occupancy=people.draw(grid, zones, 0), expected_occupancy=people.expected(grid, zones),
@@ -222,6 +229,7 @@ def build_scenario(
         electricity_carbon=emitted.electricity.on(grid), gas_carbon=emitted.gas.on(grid),
         demand=tuple(charge.on(grid) for charge in tariff.demand), currency=tariff.currency,
         carbon_kind=carbon.kind if carbon else "", people=people, heat=gains or InternalGains(),
+        district_price=district[0], district_carbon=district[1],
     )  # fmt: skip
 
 

@@ -194,7 +194,7 @@ class DemandCharge:
 
 @dataclass(frozen=True, eq=False)
 class Tariff:
-    """What electricity and gas cost.
+    """What energy costs.
 
     Fixed and minimum charges are left out: no controller changes them.
 
@@ -208,6 +208,8 @@ class Tariff:
         For reports.
     name : str
         For reports.
+    district_heating : Rate, optional
+        Price of a kilowatt-hour of district heating [currency/kWh]; needed where a plant has it.
     """
 
     electricity: Rate
@@ -215,6 +217,7 @@ class Tariff:
     demand: Sequence[DemandCharge] = ()
     currency: str = "USD"
     name: str = ""
+    district_heating: Rate | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Give what a report says of the tariff, as plain types."""
@@ -228,7 +231,7 @@ GAS_CARBON = 53.06 / 293.0711
 
 @dataclass(frozen=True, eq=False)
 class CarbonIntensity:
-    """Emissions of a kilowatt-hour of electricity and of gas.
+    """Emissions of a kilowatt-hour.
 
     Average intensity (all emissions of the grid over all generation) is what inventories count; marginal intensity
     (of the plants that follow a change of demand) is what a shift of load changes. They may differ in sign of their
@@ -242,6 +245,8 @@ class CarbonIntensity:
         ``average`` or ``marginal``: which of the two `electricity` is.
     gas : Rate
         By the upper heating value [kg/kWh]; default `GAS_CARBON`, burnt on site.
+    district_heating : Rate, optional
+        [kg/kWh]; needed where a plant has it.
 
     Raises
     ------
@@ -252,6 +257,7 @@ class CarbonIntensity:
     electricity: Rate
     kind: Literal["average", "marginal"]
     gas: Rate = field(default_factory=lambda: ConstantRate(GAS_CARBON))
+    district_heating: Rate | None = None
 
     def __post_init__(self) -> None:
         ScenarioError.unless_known(self.kind, ("average", "marginal"), "carbon: kind", "'average' or 'marginal'")

@@ -103,6 +103,13 @@ def _described(signals: Metadata, pattern: re.Pattern[str]) -> dict[str, str]:
     return {match[1]: name for match, name in matches if match is not None}
 
 
+#: BOPTEST's names of what district heating costs and emits, and columns of our forecasts; our own server has none.
+_DISTRICT_NAMES = {
+    "PriceDistrictHeatingPower": "district_heating_price",
+    "EmissionsDistrictHeatingPower": "district_heating_carbon_intensity",
+}
+
+
 class _Source(NamedTuple):
     """Where a column of a forecast comes from.
 
@@ -136,6 +143,7 @@ def forecast_sources(known: Mapping[str, object], signals: BoptestSignals, price
     found = {point: _Source(name, factor, True) for name, (_, point, factor, _) in WEATHER_NAMES.items()}
     found["electricity_price"] = _Source(PRICE_POINTS[price])
     found |= {column: _Source(name) for name, (_, column, _) in SITE_NAMES.items()}
+    found |= {column: _Source(name) for name, column in _DISTRICT_NAMES.items()}
     for zone in signals.zones:
         index = signals.forecast_zones.get(zone, zone)
         named = {name: column for name, (_, column, _) in ZONE_NAMES.items() if column}

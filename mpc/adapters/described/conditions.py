@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from mpc.adapters.described.schema import Comfort, Hours, PlantFile, Signal, Value
+from mpc.adapters.described.schema import Comfort, Emissions, Hours, PlantFile, Prices, Signal, Value
 from mpc.adapters.described.series import NamedSeries
 from mpc.errors import PlantError, ScenarioError
 from mpc.loop.conversion import conversion
@@ -301,13 +301,18 @@ def _scenario(file: PlantFile, folder: Path, source: SeriesSource, grid: StepGri
     source.prepare(_names(file), grid)
     weather = _weather(file, folder, source, grid)
     demand = () if prices.demand is None else (DemandCharge([prices.demand]),)
+
+    def of_district(part: Prices | Emissions, where: str) -> Rate | None:
+        return None if part.district_heating is None else rate(part.district_heating, f"{where}.district_heating")
+
     tariff = Tariff(
-        rate(prices.electricity, "prices.electricity"), rate(prices.gas, "prices.gas"), demand, prices.currency
-    )
+        rate(prices.electricity, "prices.electricity"), rate(prices.gas, "prices.gas"), demand, prices.currency,
+        district_heating=of_district(prices, "prices"),
+    )  # fmt: skip
     carbon = None
     if file.emissions is not None:
         electricity, gas = (rate(getattr(file.emissions, kind), f"emissions.{kind}") for kind in ("electricity", "gas"))
-        carbon = CarbonIntensity(electricity, file.emissions.kind, gas)
+        carbon = CarbonIntensity(electricity, file.emissions.kind, gas, of_district(file.emissions, "emissions"))
     people = {name: rate(zone.people, f"zones.{name}.people") for name, zone in file.zones.items()}
     most = {name: float(number.on(grid).max()) for name, number in people.items()}
     bands = {name: _band(zone.comfort, rate, f"zones.{name}.comfort") for name, zone in file.zones.items()}
@@ -347,7 +352,8 @@ def _names(file: PlantFile) -> dict[str, str]:
         asked |= {f"zones.{name}.comfort.{edge}": value for edge, value in edges.items()}
         asked |= {f"zones.{name}.people": zone.people, f"zones.{name}.gains": zone.gains}
     for key, part in (("prices", file.prices), ("emissions", file.emissions)):
-        asked |= {} if part is None else {f"{key}.electricity": part.electricity, f"{key}.gas": part.gas}
+        carriers = () if part is None else ("electricity", "gas", "district_heating")
+        asked |= {f"{key}.{carrier}": getattr(part, carrier) for carrier in carriers}
     if isinstance(file.weather, dict):
         asked |= {f"weather.{point}": signal.signal for point, signal in file.weather.items()}
     found: dict[str, str] = {}

@@ -229,8 +229,8 @@ class Prices(Entry):
 
     Parameters
     ----------
-    electricity, gas : float, str or Hours
-        Prices [currency/kWh].
+    electricity, gas, district_heating : float, str or Hours
+        Prices [currency/kWh]; that of district heating is needed where it is bought.
     demand : float, optional
         Charge for the highest quarter of an hour of a month [currency/kW].
     currency : str
@@ -239,6 +239,7 @@ class Prices(Entry):
 
     electricity: Value
     gas: Value = 0.0
+    district_heating: Value | None = None
     demand: Annotated[Number, Field(ge=0)] | None = None
     currency: Text = "EUR"
 
@@ -248,14 +249,15 @@ class Emissions(Entry):
 
     Parameters
     ----------
-    electricity, gas : float, str or Hours
-        [kg/kWh].
+    electricity, gas, district_heating : float, str or Hours
+        [kg/kWh]; that of district heating is needed where it is bought.
     kind : {"average", "marginal"}
         Which that of electricity is.
     """
 
     electricity: Value
     gas: Value = 0.0
+    district_heating: Value | None = None
     kind: Literal["average", "marginal"] = "average"
 
 
@@ -372,6 +374,13 @@ class PlantFile(Entry):
         ),
     ] | None = None  # fmt: skip
     forecast: Outlook = Outlook()
+
+    @model_validator(mode="after")
+    def _district_heating_is_priced(self) -> "PlantFile":
+        for name, part in (("prices", self.prices), ("emissions", self.emissions)):
+            if self.energy.district_heating and part is not None and part.district_heating is None:
+                raise ValueError(f"expected {name}.district_heating, which is bought, found none")
+        return self
 
     @model_validator(mode="after")
     def _battery_is_there(self) -> "PlantFile":

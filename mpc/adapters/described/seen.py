@@ -68,6 +68,9 @@ def seen_scenario(file: PlantFile, frame: pd.DataFrame, step: float) -> Scenario
     def rate(column: str) -> Rate:
         return SeenRate(frame[column].to_numpy(dtype=float)) if column in frame else ConstantRate(0.0)
 
+    def known(column: str) -> Rate | None:
+        return rate(column) if column in frame else None
+
     grid = StepGrid(frame.index[0] - pd.Timedelta(seconds=step), step, len(frame))
     people = {zone: rate(f"{zone}/occupancy_count_sensor") for zone in file.zones}
     most = {zone: float(np.max(number.on(grid))) for zone, number in people.items()}
@@ -81,11 +84,15 @@ def seen_scenario(file: PlantFile, frame: pd.DataFrame, step: float) -> Scenario
     carbon = None
     if "electricity_carbon_intensity" in frame:
         kind = "average" if file.emissions is None else file.emissions.kind
-        carbon = CarbonIntensity(rate("electricity_carbon_intensity"), kind, rate("gas_carbon_intensity"))
+        rates = [rate(f"{carrier}_carbon_intensity") for carrier in ("electricity", "gas")]
+        carbon = CarbonIntensity(rates[0], kind, rates[1], known("district_heating_carbon_intensity"))
     currency = "EUR" if file.prices is None else file.prices.currency
     weather = frame[[point for point in WEATHER_POINTS if point in frame]]
     return build_scenario(
         described_building(file), grid, Weather(weather, file.location, step=step),
-        Tariff(rate("electricity_price"), rate("gas_price"), (), currency), carbon=carbon,
+        Tariff(
+            rate("electricity_price"), rate("gas_price"), (), currency,
+            district_heating=known("district_heating_price"),
+        ), carbon=carbon,
         occupancy=SeriesOccupancy(most, by_zone=people), gains=InternalGains(equipment=0.0, lights=0.0), comfort=bands,
     )  # fmt: skip

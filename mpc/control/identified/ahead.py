@@ -15,7 +15,7 @@ from thermal._types import FloatArray
 from thermal.case.building import Location
 from thermal.case.points import OUTDOOR_TEMPERATURE
 
-_PRICES = {"electricity": "electricity_price", "gas": "gas_price"}
+_PRICES = {carrier: f"{carrier}_price" for carrier in CARRIERS}
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +106,6 @@ class Ahead:
         return cls(
             known[OUTDOOR_TEMPERATURE], np.nan_to_num(sun),
             columns(of_zones("internal_gain")) + model.box.parts["constant gain"],
-            columns([_PRICES.get(carrier, "") for carrier in CARRIERS]), columns(edges[0]), columns(edges[1]), occupied,
+            columns([*_PRICES.values()]), columns(edges[0]), columns(edges[1]), occupied,
             np.zeros((len(table), len(model.maps), WEIGHTS)), np.full(len(table), np.inf),
         )  # fmt: skip

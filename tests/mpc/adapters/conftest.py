@@ -108,8 +108,9 @@ def boptest_resources() -> dict[str, str]:
     day = [7 <= k % 24 < 22 for k in hours]
     tables = {
         "weather.csv": ("TDryBul,HGloHor,HDirNor,HDifHor", [f"{273.15 + k % 24},0,0,0" for k in hours]),
-        "prices.csv": ("PriceElectricPowerConstant,PriceElectricPowerHighlyDynamic",
-                       [f"0.25,{0.3 if d else 0.1}" for d in day]),
+        "prices.csv": ("PriceElectricPowerConstant,PriceElectricPowerHighlyDynamic,PriceDistrictHeatingPower",
+                       [f"0.25,{0.3 if d else 0.1},0.08" for d in day]),
+        "emissions.csv": ("EmissionsElectricPower,EmissionsDistrictHeatingPower", ["0.2,0.1" for _ in day]),
         "setpoints.csv": ("LowerSetp[1],UpperSetp[1]", [f"{294.15 if d else 288.15},{297.15 if d else 303.15}" for d in day]),
         "occupancy.csv": ("Occupancy[1]", [f"{0 if d else 5}" for d in day]),
     }  # fmt: skip

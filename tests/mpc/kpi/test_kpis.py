@@ -85,8 +85,10 @@ def test_finer_steps_change_nothing(plain_scenario: Make, parts: int, seed: int)
     scenario = plain_scenario(n_steps=48)
     co2 = 1e-3 + 1e-4 * np.random.default_rng(seed).normal(0, 1, (49, 2))
     run = record(scenario, seed, co2=co2, district_heating=np.full(48, 700.0))
-    options = {"co2_limit": 1e-3, "district_price": 0.08, "district_carbon": 0.2}
-    whole, cut = (measure_kpis(r, scenario, **options).to_dict() for r in (run, finer(run, parts)))
+    with pytest.raises(MpcError, match="district heating: expected its price, and its emissions where they count"):
+        measure_kpis(run, scenario, co2_limit=1e-3)
+    scenario = replace(scenario, district_price=np.full(48, 0.08), district_carbon=np.full(48, 0.2))
+    whole, cut = (measure_kpis(r, scenario, co2_limit=1e-3).to_dict() for r in (run, finer(run, parts)))
     for name in ("tdis_tot", "idis_tot", "ener_tot", "cost_tot", "emis_tot", "pele_tot", "pgas_tot", "pdih_tot"):
         assert cut[name] == pytest.approx(whole[name], rel=1e-9, abs=1e-12), name
     for zone in scenario.zones:

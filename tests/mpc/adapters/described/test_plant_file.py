@@ -14,12 +14,14 @@ import pytest
 import yaml
 
 from mpc.adapters.boptest.scenario import YearClock
+from mpc.adapters.described.actuators import described_actuators
 from mpc.adapters.described.load import _mappings, _span, load_plant
 from mpc.adapters.described.read import READY, ready_plants
 from mpc.adapters.described.schema import Period, PlantFile
 from mpc.adapters.described.series import NamedSeries, read_table, unit_period
 from mpc.adapters.fmu.plant import FmuSignals
 from mpc.errors import MpcError, PlantActionError, PlantError
+from mpc.identify.machines import find_machines
 from mpc.identify.telemetry import PlantTelemetry
 from mpc.kpi.kpis import measure_kpis
 from mpc.loop.plant import Measurements
@@ -31,6 +33,7 @@ from mpc.studies.electric import electric_of
 
 pytest.importorskip("fmpy", reason="needs the extra [fmu]")
 GUIDE = Path(__file__).parents[4] / "docs" / "plant.md"
+OFFICE = ("core", "east", "north", "south", "west")
 SPEED, SETPOINT = "heat_pump/compressor_speed", "house/zone_air_heating_temperature_setpoint"
 Make = Callable[..., Path]
 
@@ -159,7 +162,8 @@ def test_a_server_and_the_units_file_are_the_same_plant(
     powers = [4000.0 / 3.0 + 100.0, 0.0, 8000.0 / 3.0 + 100.0]
     np.testing.assert_allclose(own.measurements["heat_pump/electrical_power_sensor"].iloc[[0, 1, 4]], powers)
     np.testing.assert_array_equal(remote.record.zone_temperature, own.record.zone_temperature)
-    both = [c for c in seen[0] if c in seen[1] and "internal_gain" not in c]
+    others = ("internal_gain", "electricity_carbon_intensity")  # that the description leaves out
+    both = [c for c in seen[0] if c in seen[1] and not c.endswith(others)]
     assert len(both) == 6
     pd.testing.assert_frame_equal(seen[0][both], seen[1][both], check_names=False, check_freq=False)
 
@@ -189,8 +193,40 @@ def test_ready_descriptions_fit_the_schema() -> None:
         assert all(signal.endswith("_y") for signals in described.energy.model_dump().values() for signal in signals)
 
 
-def test_the_battery_of_the_guide_is_no_machine(folder: Path) -> None:
+@pytest.mark.parametrize("name, chosen, meters, cooling", [
+    ("bestest_air", ["office/zone_air_heating_temperature_setpoint"], [""], True),
+    ("bestest_hydronic", ["house/zone_air_heating_temperature_setpoint"], ["boiler/heating_power_sensor"], True),
+    ("bestest_hydronic_heat_pump", ["heat_pump/compressor_speed"], ["heat_pump/heating_power_sensor"], False),
+    ("twozone_apartment_hydronic", [f"{zone}/zone_air_heating_temperature_setpoint" for zone in ("day", "night")],
+     ["day/heating_power_sensor", "night/heating_power_sensor"], False),
+    ("multizone_residential_hydronic", ["boiler/part_load_ratio"], [""], True),
+    ("multizone_office_simple_air", [f"{zone}/zone_air_heating_temperature_setpoint" for zone in OFFICE],
+     [f"{zone}/supply_air_flowrate_sensor" for zone in OFFICE], True),
+    ("singlezone_commercial_hydronic", ["building/zone_air_heating_temperature_setpoint"],
+     ["district/heating_power_sensor"], False),
+])  # fmt: skip
+def test_what_is_identified_of_ready_plants(name: str, chosen: list[str], meters: list[str], cooling: bool) -> None:
+    file = PlantFile.model_validate(yaml.safe_load((READY / f"{name}.yaml").read_text(encoding="utf-8")))
+    there = described_actuators(file, {a: (0.0, 400.0 if a.endswith("setpoint") else 1.0) for a in file.actuators})
+    found = find_machines(there, [*file.measurements], [*file.zones])
+    assert [m.name for m in found] == chosen and [m.meter for m in found] == meters
+    if cooling:
+        cools = find_machines(there, [*file.measurements], [*file.zones], cooling=True)
+        assert all(m.sign == -1.0 and len(m.serves) == 1 for m in cools) and len(cools) >= len(file.zones)
+
+
+def test_a_source_of_the_guide_needs_terminals_of_several_zones(folder: Path) -> None:
     told = yaml.safe_load(blocks("yaml")[0]) | yaml.safe_load(blocks("yaml")[1])
+    (folder / "plant.yaml").write_text(yaml.safe_dump(told))
+    study = PlantStudy(folder / "plant.yaml")
+    expected = np.array([[253.15, 13800.0], [273.15, 31400.0], [293.15, 49000.0]])
+    np.testing.assert_allclose(study.site.capacity, expected)
+    with study.plant() as plant, pytest.raises(PlantError, match="source.capacity: expected two setpoints or more"):
+        study.machines(plant)
+
+
+def test_the_battery_of_the_guide_is_no_machine(folder: Path) -> None:
+    told = yaml.safe_load(blocks("yaml")[0]) | yaml.safe_load(blocks("yaml")[2])
     with pytest.raises(ValueError, match="expected an actuator of the description as the battery's, found 'battery/batt"):
         PlantFile.model_validate(told)
     told["actuators"]["battery/battery_command"] = {"signal": "oveBat_u", "range": [-1, 1]}
@@ -222,6 +258,7 @@ EDITS: list[tuple[dict[str, Any], str]] = [
     ({"source": {"capacity": [["7 degC", 9000], ["-5 degC", 7000]]}},
      "source.capacity: expected a capacity over rising outdoor temperatures, found [280.15, 268.15] K"),
     ({"source": {"capacity": []}}, "source.capacity"),
+    ({"energy": {"district_heating": ["reaQFloHea_y"]}}, "expected prices.district_heating, which is bought, found none"),
     ({"actuators": {SPEED: "oveHeaPumX_u"}}, "'oveHeaPumX_u'; the nearest valid one is 'oveHeaPumY_u'"),
     ({"zones": {"living": HOUSE | {"comfort": {"lower": 21, "upper": 24}}}},
      "zones.living.comfort: expected a lower and an upper temperature in K, found 21 to 24"),

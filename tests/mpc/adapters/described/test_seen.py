@@ -38,15 +38,29 @@ def described(tmp_path: Path) -> Path:
     return tmp_path / "plant.yaml"
 
 
+@pytest.mark.parametrize("district", [False, True])
 def test_indicators_of_a_server_are_those_of_the_units_file(
-    described: Path, boptest_url: str, make_house: Make, boptest_resources: dict[str, str]
+    described: Path, boptest_url: str, make_house: Make, boptest_resources: dict[str, str], district: bool
 ) -> None:
     pytest.importorskip("httpx", reason="needs the extra [boptest]")
+    if district:  # as of a building on district heating, whose heat is bought and priced
+        told = yaml.safe_load(described.read_text(encoding="utf-8"))
+        told["energy"]["district_heating"] = ["reaQFloHea_y"]
+        told["prices"]["district_heating"] = "PriceDistrictHeatingPower"
+        told["emissions"] = {"electricity": "EmissionsElectricPower",
+                             "district_heating": "EmissionsDistrictHeatingPower"}  # fmt: skip
+        described.write_text(yaml.safe_dump(told), encoding="utf-8")
     unit = make_house(kinds=("CoSimulation",), resources=boptest_resources)
     remote, own = (run_controller(PlantStudy(described, str(at), **START), "full_speed") for at in (boptest_url, unit))
     assert len(remote.loop.measurements) == 16 and remote.kpis.cost_tot > 0.0
     for name in ("cost_tot", "ener_tot", "tdis_tot"):
         assert getattr(remote.kpis, name) == pytest.approx(getattr(own.kpis, name), rel=1e-9)
+    if district:
+        record = own.loop.record
+        heat, electricity = (float(np.mean(v)) * 4e-3 / 192.0 for v in (record.district_heating, record.electricity))
+        assert own.kpis.ener_tot == pytest.approx(heat + electricity) and heat > 0.0
+        assert own.kpis.cost_tot == pytest.approx(0.08 * heat + 0.3 * electricity)
+        assert remote.kpis.emis_tot == pytest.approx(0.1 * heat + 0.2 * electricity)
     made = run_experiment(PlantStudy(described, boptest_url, **START), 1, ExcitationSettings())
     assert {"heat_pump/compressor_speed", "electricity", "electricity_price"} <= {
         c.removeprefix("set/") for c in made.telemetry.frame
