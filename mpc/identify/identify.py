@@ -96,8 +96,9 @@ def identify(telemetry: PlantTelemetry, machines: Sequence[Machine], progress: P
     bought = {name: telemetry.column(name) for name in CARRIERS if name in telemetry.frame}
     own = [telemetry.column(m.power) if m.power and m.meter else None for m in machines]
     above = _above(telemetry, machines)
-    maps, base = map_machines(machines, loads, signals, bought, above, own)
-    source, left = find_source(loads, bought, maps, round(86_400.0 / telemetry.step))
+    per_day = round(86_400.0 / telemetry.step)
+    maps, base = map_machines(machines, loads, signals, bought, above, per_day, own)
+    source, left = find_source(loads, bought, maps, per_day)
     if source is not None:
         rest = [{kind: curve for kind, curve in m.powers.items() if kind not in source.powers} for m in maps]
         maps = tuple(replace(m, powers=powers) for m, powers in zip(maps, rest, strict=True))

@@ -13,7 +13,7 @@ from mpc.identify.corrections import PowerCorrection, Reading
 from mpc.identify.curves import EMITTER, OUTDOOR, Curve
 from mpc.identify.limits import limits_of
 from mpc.identify.machines import Machine, as_heated, pairs_as_heated
-from mpc.identify.regression import IDLE, SAME, Loads, regress
+from mpc.identify.regression import IDLE, SAME, Loads, regress, regress_power
 from thermal._types import FloatArray
 
 #: How a machine is run: whole or not at all for parts of the time, at any part load, or by a zone's own controller.
@@ -160,7 +160,7 @@ def led_heat(maps: Sequence[MachineMap]) -> FloatArray:
 
 def map_machines(
     machines: Sequence[Machine], loads: Loads, signals: FloatArray, bought: Mapping[str, FloatArray],
-    above: FloatArray, own: Sequence[FloatArray | None] = (),
+    above: FloatArray, per_day: int, own: Sequence[FloatArray | None] = (),
 ) -> tuple[tuple[MachineMap, ...], dict[str, float]]:
     """Make the map of each machine.
 
@@ -176,6 +176,8 @@ def map_machines(
         Power of each kind that the plant buys [W].
     above : ndarray, shape (n_time, n_machine)
         How far setpoints lie above the air of their zones, below it where they cool [K]; NaN of machines.
+    per_day : int
+        Steps of a day.
     own : sequence of ndarray or None
         What each machine's own sensor of power says, shape (n_time,) [W]; None of those without.
 
@@ -189,7 +191,8 @@ def map_machines(
     everyone = range(len(machines))
     stops = [bool((loads.level[:, m] <= IDLE).any()) for m in everyone]
     heats = [regress(loads, signals[:, m], [m], base=stops[m])[0][0] for m in everyone]
-    powers = {kind: regress(loads, values, everyone) for kind, values in bought.items() if np.ptp(values) > 1.0}
+    moves = {kind: values for kind, values in bought.items() if np.ptp(values) > 1.0}
+    powers = {kind: regress_power(loads, values, everyone, per_day) for kind, values in moves.items()}
     made = []
     for m, machine in enumerate(machines):
         found = MachineMap(machine, "setpoint", heats[m], {kind: curves[m] for kind, (curves, _) in powers.items()})

@@ -11,13 +11,10 @@ from mpc.errors import PlantError
 from mpc.identify.curves import OUTDOOR, PER, Curve, interval_of
 from mpc.identify.machines import FULL
 from mpc.identify.maps import WORSE, MachineMap, led_heat
-from mpc.identify.regression import Loads, curve_of, design_of, least_squares, left_out_error
+from mpc.identify.regression import BETTER, Loads, curve_of, design_of, least_squares, left_out_error
 from mpc.identify.shared import shares_of
 from mpc.identify.telemetry import CARRIERS
 from thermal._types import FloatArray
-
-#: Squared error on left-out days over that of a map for each machine, from which on the source is believed [-].
-_BETTER = 0.9
 
 #: Part of full load that is compared with it [-].
 _HALF = 0.5
@@ -178,7 +175,7 @@ def find_source(
     errors = {least: error(design) for least, design in designs.items()}
     alike = min(error(_design(loads.level, shares, loads.outdoor - middle, least)) for least in _LEAST)
     least = min(errors, key=errors.__getitem__)
-    if full <= 0.0 or not errors[least] < _BETTER * min(alike, error(design_of(loads, range(len(maps))))):
+    if full <= 0.0 or not errors[least] < BETTER * min(alike, error(design_of(loads, range(len(maps))))):
         return None, {}
     curves, base = {}, {}
     for kind in kinds:

@@ -33,7 +33,7 @@ def learned(seed: int = 0, count: int = 600) -> MachineMap:
     loads = Loads(load[:, None], rng.normal(268.0, 4.0, count), np.full((count, 1), 303.15))
     power = 50.0 + two_stages(load)
     above = np.full((count, 1), np.nan)
-    (found,), _ = map_machines([MACHINE], loads, 10_000.0 * loads.level, {"electricity": power}, above, [power])
+    (found,), _ = map_machines([MACHINE], loads, 10_000.0 * loads.level, {"electricity": power}, above, 96, [power])
     return found
 
 

@@ -48,7 +48,7 @@ def test_standing_power_makes_a_machine_run_whole() -> None:
     given = loads(1)
     heat = 12_000.0 * given.level
     above = np.full((N, 1), np.nan)
-    (found,), base = map_machines([SPEED], given, heat, {"electricity": power_of(given)}, above)
+    (found,), base = map_machines([SPEED], given, heat, {"electricity": power_of(given)}, above, 96)
     assert (found.operation, round(found.standing), round(base["electricity"])) == ("duty", 800, 200)
     assert found.efficiency(1.0) == pytest.approx(12_000.0 / 3800.0) and found.efficiency(0.4) < found.efficiency(1.0)
     assert found.at(found.heat, 0.5, 280.15, 303.15) == pytest.approx(6000.0)  # half of the time at full load
@@ -56,7 +56,7 @@ def test_standing_power_makes_a_machine_run_whole() -> None:
     assert found.at(electricity, 0.5, 280.15, 303.15) == pytest.approx(1900.0)
     u = given.level[:, 0]
     falling = 1500.0 * u + 1500.0 * u**2  # a compressor that is better at part load, without standing power
-    (part,), _ = map_machines([SPEED], given, heat, {"electricity": falling}, above)
+    (part,), _ = map_machines([SPEED], given, heat, {"electricity": falling}, above, 96)
     assert part.operation == "modulated" and part.at(part.powers["electricity"], 0.5, 280.15, 303.15) == pytest.approx(
         1125.0
     )

@@ -136,6 +136,6 @@ def test_limits_are_read_from_the_steps_at_which_more_was_wanted() -> None:
     above = np.full((n, 1), 0.0)
     above[:4] = 1.0
     (found,), _ = map_machines([led().maps[0].machine], Loads(level, outdoor, 300.0 + level**3),
-                               5000.0 * level, {}, above)  # fmt: skip
+                               5000.0 * level, {}, above, 96)  # fmt: skip
     assert found.limits == ((263.0, 0.35),)
     assert found.heat.coefficients["command"] == pytest.approx(5000.0)

@@ -43,7 +43,7 @@ def _loads(seed: int) -> Loads:
 def _found(loads: Loads, power: np.ndarray, own: bool = False) -> tuple[Source | None, dict[str, float]]:
     noise = np.random.default_rng(9).normal(0.0, 100.0, N)
     bought = {"electricity": power + noise}
-    maps, _ = map_machines(MACHINES, loads, FULL * loads.level, bought, np.full((N, 4), np.nan))
+    maps, _ = map_machines(MACHINES, loads, FULL * loads.level, bought, np.full((N, 4), np.nan), 96)
     if own:
         maps = tuple(replace(m, machine=replace(m.machine, power=f"{m.machine.name}/power")) for m in maps)
     return find_source(loads, bought, maps, 96)
@@ -110,7 +110,7 @@ def test_rooms_that_move_together_beside_metered_lights_are_none(seed: int) -> N
         for k in range(rooms)
     ]
     bought = {"electricity": 1500.0 * level.sum(axis=1) + lights + rng.normal(0.0, 50.0, n)}
-    maps, _ = map_machines(machines, loads, 1500.0 * level, bought, np.full((n, rooms), np.nan))
+    maps, _ = map_machines(machines, loads, 1500.0 * level, bought, np.full((n, rooms), np.nan), 96)
     assert find_source(loads, bought, maps, 96) == (None, {})
 
 
