@@ -12,7 +12,7 @@ from typing import Any
 import yaml
 from energyplus_trials.frame import STEPS_PER_HOUR
 
-from foreign_models import flats, house, office, shop
+from foreign_models import flats, house, office, shop, vav_floor
 from foreign_models.drawn import drawn_plants
 from foreign_models.foreign_plant import ForeignPlant
 from foreign_models.heat_pump import Chiller
@@ -42,6 +42,12 @@ PLANTS = {
         office.description,
     ),
     "shop": ForeignPlant("Shop of 216 m2 with a unitary heat pump of 24 kW", shop.shop, shop.description),
+    "vav_floor": ForeignPlant(
+        "Storey of 1661 m2 of the Medium Office, five VAV boxes with electric reheat, air handler with a gas furnace",
+        vav_floor.vav_floor,
+        vav_floor.description,
+        vav_floor.WEATHER,
+    ),
     "cooled_shop": ForeignPlant(
         "The same shop in summer", partial(shop.shop, SUMMER), partial(shop.description, SUMMER), cooled=True
     ),

@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+import yaml
 
 from mpc.adapters.described.load import load_plant
 from mpc.errors import ControlError
-from mpc.identify.machines import Machine
+from mpc.identify.machines import Machine, find_machines
 from mpc.loop.actuators import Actuator
 from mpc.loop.plant import Measurements, PointLayout
 from mpc.loop.run import run_closed_loop
@@ -222,6 +223,34 @@ def test_every_setpoint_of_cooling_reaches_its_machine(made: Callable[..., Any],
         room = f"{column.rpartition('/')[0]}/{ZONE_TEMPERATURE}"
         assert with_own[room].iloc[50] == pytest.approx(297.15, abs=0.05)  # its own clock holds 24 degC
         assert acted[room].iloc[-1] < with_own[room].iloc[-1] - 1.0
+
+
+@pytest.mark.long
+@needs_energyplus
+def test_heat_of_supply_air_is_what_energyplus_says_of_the_terminal(
+    models: Callable[[str], ModuleType], tmp_path: Path
+) -> None:
+    path = models("plants").write_plant("vav_floor", tmp_path)
+    told = yaml.safe_load(path.read_text(encoding="utf-8"))
+    rooms = {"core": "Core_bottom", "south": "Perimeter_bot_ZN_1", "north": "Perimeter_bot_ZN_3"}
+    kinds = {HEATING_POWER: "Heating", "electrical_power_sensor": "Cooling"}
+    told["measurements"] |= {
+        f"{room}/{point}": {"signal": f"{zone} VAV Box, Zone Air Terminal Sensible {kind} Rate", "unit": "W"}
+        for room, zone in rooms.items() for point, kind in kinds.items()
+    }  # fmt: skip
+    path.write_text(yaml.safe_dump(told), encoding="utf-8")
+    with load_plant(path, changes={"period": {"start": "2023-01-09", "days": 1, "warm_up_days": 1}}) as plant:
+        columns = [name for name in plant.columns if not name.endswith(HEATING_POWER)]
+        machines = find_machines(plant.actuators, columns, plant.zone_names)
+        assert [m.meter for m in machines] == [f"{z}/supply_air_flowrate_sensor" for z in plant.zone_names]
+        seen = run_closed_loop(plant, Held({}), steps=84).measurements.iloc[40:]  # while flows are steady
+    by_room = {m.serves[0]: m for m in machines}
+    for room in rooms:
+        heat = seen[f"{room}/{HEATING_POWER}"] - seen[f"{room}/electrical_power_sensor"]
+        found = by_room[room].metered_heat(lambda column: seen[column])
+        assert np.abs(heat).max() > 2000.0
+        # of a step in which the air handler stops the product of means is none of the mean of products
+        assert float(np.quantile(np.abs(found - heat), 0.95)) < 0.02 * float(np.abs(heat).max())
 
 
 @pytest.mark.long
