@@ -197,5 +197,6 @@ def description(of: Office | None = None) -> dict[str, Any]:
         "heat_pump/heating_power_sensor": f"{PUMP}, Heat Pump Load Side Heat Transfer Rate",
     }
     told["actuators"] |= acted
-    sheet = of.machine.sheet(_HOT_WATER) if of.chiller is None else of.chiller.sheet(_COLD_WATER)
-    return told | {"source": {"capacity": sheet}, "energy": {"electricity": electricity}}
+    source = {"heating": of.machine.sheet(_HOT_WATER)}
+    source |= {} if of.chiller is None else {"cooling": of.chiller.sheet(_COLD_WATER)}
+    return told | {"source": source, "energy": {"electricity": electricity}}

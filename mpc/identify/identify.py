@@ -12,7 +12,7 @@ from calibration.grey_box.judge import LeadError, judge
 from calibration.grey_box.network import GreyBox
 from mpc.errors import PlantError
 from mpc.identify.curves import EMITTER
-from mpc.identify.machines import Machine, as_heated, pairs_as_heated
+from mpc.identify.machines import Machine, as_heated, check_terminals, pairs_as_heated
 from mpc.identify.maps import led_heat, map_machines
 from mpc.identify.model import PlantModel
 from mpc.identify.regression import Loads
@@ -79,6 +79,8 @@ def identify(telemetry: PlantTelemetry, machines: Sequence[Machine], progress: P
     days = len(telemetry.frame) * telemetry.step / 86_400.0
     PlantError.unless(days >= _FEWEST, "identify", f"{_FEWEST:g} days of telemetry at least", f"{days:.3g}")
     machines = [_measured(machine, telemetry) for machine in machines]
+    if telemetry.site.capacity:
+        check_terminals(machines, telemetry.site.areas)
     data = _data(telemetry, machines)
     suns = tuple(telemetry.suns)
     serves = {machine.name: machine.serves for machine in machines}
@@ -118,7 +120,7 @@ def identify(telemetry: PlantTelemetry, machines: Sequence[Machine], progress: P
 
 def _measured(machine: Machine, telemetry: PlantTelemetry) -> Machine:
     """Leave out a sensor of heat that a machine which cools does not move: it is that of what heats the zone."""
-    if machine.sign > 0.0 or not machine.meter or machine.metered_heat(telemetry.column).min() < -1.0:
+    if machine.sign > 0.0 or not machine.meter or machine.signal(telemetry).max() > 1.0:
         return machine
     PlantError.unless(
         machine.power, f"telemetry: {machine.meter}", "negative heat while the zone is cooled", "none below -1 W",
@@ -165,6 +167,8 @@ def _above(telemetry: PlantTelemetry, machines: Sequence[Machine]) -> FloatArray
 def _notes(telemetry: PlantTelemetry, machines: Sequence[Machine], suns: Sequence[str]) -> tuple[str, ...]:
     notes = []
     for machine in machines:
+        if machine.air:
+            notes.append(f"heat of {machine.name} is that of its supply air, {machine.meter}")
         if not machine.meter:
             notes.append(f"no heat of {machine.name} is measured: it is counted in watts of what is bought at 7 degC")
         told = [telemetry.frame[c] for c in (f"{SET}{machine.name}", machine.name) if c in telemetry.frame]

@@ -52,7 +52,8 @@ class HeatLimit:
         Outdoor air [K], rising, and largest load [-] of a data sheet, on straight lines between them: the mean of the
         prior. Sheets have edges, where a compressor stops or a resistance comes in: the mean of the loads within the
         error of an outdoor temperature is relied on, and a reading between them says nothing. Their least would have a
-        building heated all day for a compressor that may stop at night.
+        building heated all day for a compressor that may stop at night. Where readings are no less than it says, it is
+        relied on itself.
 
     Examples
     --------
@@ -108,7 +109,13 @@ class HeatLimit:
             Its standard deviation where it is forecast [K].
         """
         mean, deviation = self._posterior(outdoor, error)
-        return mean if not self._bins else np.asarray(np.maximum(mean - deviation, _LEAST))
+        if not self._bins:
+            return mean
+        careful = np.maximum(mean - deviation, _LEAST)
+        if not self.sheet:
+            return np.asarray(careful)
+        told = self._near(outdoor, error).mean(axis=0)  # more than the sheet says is no reason to rely on less
+        return np.asarray(np.where(mean >= told, np.maximum(careful, told), careful))
 
     def likely(self, outdoor: FloatArray) -> FloatArray:
         """Load that is expected, shape (n,) [-].

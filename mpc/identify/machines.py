@@ -205,8 +205,11 @@ class Machine:
         telemetry : PlantTelemetry
             Of the plant.
         """
-        if self.meter:
-            return np.asarray(self.sign * self.metered_heat(telemetry.column))
+        if self.heat:
+            return self.sign * telemetry.column(self.heat)
+        if self.air:  # of the product, not of each: a gap of a temperature is no 0 K
+            heat = self.metered_heat(lambda column: telemetry.frame[column].astype(float))
+            return self.sign * telemetry.bridged(heat)
         if self.power:
             return telemetry.column(self.power)
         bought = telemetry.bought
@@ -274,8 +277,9 @@ def find_machines(
 ) -> tuple[Machine, ...]:
     """Choose the actuators that are controlled: commands of machines, else setpoints of zones.
 
-    Fans, pumps, valves and dampers are chosen where there is nothing else: they follow what the plant's own control
-    does. All that is chosen heats, or all cools; the other is left to the plant.
+    Fans, pumps, valves and dampers are chosen last: they follow what the plant's own control does. What cannot be told
+    apart by its sensors is passed over where something else can. All that is chosen heats, or all cools; the other is
+    left to the plant.
 
     Parameters
     ----------
@@ -308,7 +312,9 @@ def find_machines(
     main = [name for name in commands if not _HELPERS.search(points[name])]
     chosen, expected = [*wanted], f"a {COOLING_SETPOINT}"
     if not wanted:
-        chosen = setpoints[COOLING_SETPOINT] if cooling else main or setpoints[HEATING_SETPOINT] or commands
+        heated = [kind for kind in (main, setpoints[HEATING_SETPOINT], commands) if kind]
+        told = [kind for kind in heated if len(kind) == 1 or all(any(_meters_of(name, columns)) for name in kind)]
+        chosen = setpoints[COOLING_SETPOINT] if cooling else next(iter(told or heated), [])
     if not cooling:
         expected = f"a command of a machine, or a {HEATING_SETPOINT}"
     PlantError.unless(chosen, "actuators", expected, ", ".join(by_name) or "none")
@@ -321,15 +327,15 @@ def find_machines(
     for name in chosen:
         entity = name.rpartition("/")[0]
         role: Role = "setpoint" if any(name in kind for kind in setpoints.values()) else "machine"
-        own = [c for c in heats if c.rpartition("/")[0] == entity]
-        heat = own[0] if own else heats[0] if len(heats) == len(chosen) == 1 else ""
-        air = () if heat or role == "machine" else _air_of(entity, columns)
-        entities = (entity, heat.rpartition("/")[0])
-        power = next((f"{e}/{p}" for e in entities if e for p in _POWERS if f"{e}/{p}" in columns), "")
+        heat, power, air = _meters_of(name, columns)
+        if not heat and len(heats) == len(chosen) == 1:
+            heat, air = heats[0], ()
+            power = power or _own(heat.rpartition("/")[0], _POWERS, columns)
         PlantError.unless(
             heat or air or power or len(chosen) == 1, f"actuator {name}",
             f"a sensor {entity}/{HEATING_POWER} or {_POWERS[0]}", "none",
-            f"add it to `measurements`, or {SUPPLY_FLOW} and {DISCHARGE_TEMPERATURE}: machines have to be told apart",
+            f"add it to `measurements`, or {SUPPLY_FLOW} and {DISCHARGE_TEMPERATURE}, or choose others by --actuators:"
+            " machines have to be told apart",
         )  # fmt: skip
         PlantError.unless(
             name not in sheets or (role == "setpoint" and (heat or air)), f"actuators.{name}.capacity",
@@ -342,32 +348,46 @@ def find_machines(
     return tuple(made)
 
 
-def check_terminals(machines: Sequence[Machine]) -> None:
+def check_terminals(machines: Sequence[Machine], zones: Iterable[str]) -> None:
     """Refuse machines of which no data sheet of one source can say how much heat they give together.
+
+    Heat of supply air will not do: a source of a VAV system heats what comes from outdoors, too.
 
     Parameters
     ----------
     machines : sequence of Machine
         That are controlled.
+    zones : iterable of str
+        All of the plant.
 
     Raises
     ------
     PlantError
-        When there is only one, or one is no setpoint with measured heat.
+        When there is only one, one is no setpoint whose heat has a meter, or a zone has none.
     """
-    fitting = [m.name for m in machines if m.role == "setpoint" and m.meter]
+    fitting = [m.name for m in machines if m.role == "setpoint" and m.heat]
+    served = {zone for m in machines for zone in m.serves}
     PlantError.unless(
-        len(fitting) == len(machines) > 1, "source.capacity", "two setpoints or more, whose heat is measured",
+        len(fitting) == len(machines) > 1 and served >= set(zones), "source",
+        "setpoints of all zones, two at least, whose heat is measured",
         ", ".join(m.name for m in machines), "say the data sheet of a single machine as `capacity` of its setpoint",
     )  # fmt: skip
 
 
-def _air_of(zone: str, columns: Sequence[str]) -> tuple[str, ...]:
-    """Columns of a zone's supply air and its own: flow and temperatures; nothing where one is not measured."""
-    supplies = [f"{zone}/{point}" for point in (DISCHARGE_TEMPERATURE, _SUPPLY_TEMPERATURE)]
-    supply = next((column for column in supplies if column in columns), "")
-    found = (f"{zone}/{SUPPLY_FLOW}", supply, f"{zone}/{ZONE_TEMPERATURE}")
-    return found if all(column in columns for column in found) else ()
+def _own(entity: str, points: Sequence[str], columns: Sequence[str]) -> str:
+    """First column of an entity's points that is measured; empty where none is."""
+    return next((f"{entity}/{point}" for point in points if f"{entity}/{point}" in columns), "")
+
+
+def _meters_of(name: str, columns: Sequence[str]) -> tuple[str, str, tuple[str, ...]]:
+    """Columns of an actuator's own heat and power; where a setpoint's zone has neither, those of its supply air."""
+    entity, _, point = name.rpartition("/")
+    heat, power = (_own(entity, points, columns) for points in ((HEATING_POWER,), _POWERS))
+    if heat or power or point not in (HEATING_SETPOINT, COOLING_SETPOINT):
+        return heat, power, ()
+    supply = _own(entity, (DISCHARGE_TEMPERATURE, _SUPPLY_TEMPERATURE), columns)
+    air = (f"{entity}/{SUPPLY_FLOW}", supply, f"{entity}/{ZONE_TEMPERATURE}")
+    return heat, power, air if all(column in columns for column in air) else ()
 
 
 def _served(entity: str, zones: Sequence[str]) -> tuple[str, ...]:

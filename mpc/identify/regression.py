@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
 from mpc.errors import PlantError
 from mpc.identify.curves import Curve, features_of
@@ -24,7 +23,8 @@ SAME = 0.05
 #: Parts of the days of which each is left out once.
 _FOLDS = 5
 
-#: What is left out of all machines' features, one set after the other, until more load of none seems to cost less.
+#: What is left out of a machine's features, one set after the other, until more load does not seem to cost less; after
+#: the last it has no part in what is bought.
 _LEFT_OUT: tuple[tuple[str, ...], ...] = (
     (),
     ("emitter",),
@@ -33,6 +33,7 @@ _LEFT_OUT: tuple[tuple[str, ...], ...] = (
     ("emitter", "command^2 outdoor", "command^2", "outdoor"),
     ("emitter", "command^2 outdoor", "command^2", "outdoor", "standing"),
 )
+_NO_PART = len(_LEFT_OUT)
 
 #: Squared error on left-out days over that of a larger set of features, from which on a smaller one is taken [-].
 BETTER = 0.9
@@ -91,14 +92,16 @@ class Loads:
 
 
 def _design(
-    loads: Loads, known: BoolArray, machines: Sequence[int], base: bool, left_out: Sequence[str] = ()
+    loads: Loads, known: BoolArray, machines: Sequence[int], base: bool,
+    left_out: Mapping[int, Sequence[str]] | None = None,
 ) -> tuple[FloatArray, list[tuple[int, str]]]:
     """Columns of a regression, by machine and feature; a constant first, where something may be left."""
     columns, owners = ([np.ones(int(known.sum()))], [(-1, "constant")]) if base else ([], [])
     for m in machines:
         for name, feature in loads.features(m).items():
             column = feature[known[loads.known]]
-            if name not in left_out and (name != "standing" or not (base and column.all())):
+            told = name not in (left_out or {}).get(m, ())
+            if told and (name != "standing" or not (base and column.all())):
                 columns.append(column)
                 owners.append((m, name))
     return np.column_stack(columns), owners
@@ -183,9 +186,10 @@ def regress_power(
     """Regress what is bought on the features of machines, so that more load of none costs less.
 
     Loads of many rooms rise and fall together, and a regression on all of their features gives some a negative price
-    of heat, which a controller would take for a source of money. So features are left out, the same of all machines,
-    until power rises with every load in the weather that was seen; and further where that predicts left-out days a
-    tenth better. Where even a price of heat each is negative, it is held at 0 (non-negative least squares).
+    of heat, which a controller would take for a source of money. So of a machine whose power does not rise with its
+    load in the weather that was seen features are left out until it does; one whose heat itself seems to have a
+    negative price has no part in what is bought. More is left out, the same of all, while that predicts left-out days
+    a tenth better.
 
     Parameters
     ----------
@@ -194,36 +198,54 @@ def regress_power(
     values : ndarray, shape (n_time,)
         Bought [W].
     machines : sequence of int
-        Which machines have a part in it.
+        Which machines may have a part in it.
     per_day : int
         Steps of a day.
 
     Returns
     -------
     list of Curve
-        One a machine.
+        One a machine, without coefficients where it has no part.
     float
         What is bought whatever they do [W].
+
+    Raises
+    ------
+    PlantError
+        When there are too few steps with known loads.
     """
-    best: tuple[list[Curve], float] | None = None
-    least = np.inf
+    left_out, least = dict.fromkeys(machines, 0), np.inf
+    best: tuple[list[Curve], float] = [], 0.0
+    while True:
+        curves, base, design = _rising(loads, values, left_out)
+        error = left_out_error(design, values, per_day)
+        if not error < BETTER * least:
+            return best
+        best, least = (curves, base), error
+        if min(left_out.values(), default=_NO_PART) == _NO_PART:
+            return best
+        left_out = {m: min(count + 1, _NO_PART) for m, count in left_out.items()}
+
+
+def _rising(loads: Loads, values: FloatArray, left_out: dict[int, int]) -> tuple[list[Curve], float, FloatArray]:
+    """Regress with so many sets of features left out of each machine, or more where power would fall with its load.
+
+    Returns curves, the constant [W] and the columns, shape (n_time, n_column); `left_out` becomes what was left out.
+    """
     rows = loads.known & np.isfinite(values)
-    for left_out in _LEFT_OUT:
-        design, owners = _design(loads, rows, machines, True, left_out)
-        names = [[name if owner == m else "" for owner, name in owners] for m in machines]
+    while True:
+        part = [m for m, count in left_out.items() if count < _NO_PART]
+        design, owners = _design(loads, rows, part, True, {m: _LEFT_OUT[left_out[m]] for m in part})
         found, deviations = least_squares(design, values[rows])
-        curves = [curve_of(mine, found, deviations) for mine in names]
-        if all(_rises(curve, loads, m) for curve, m in zip(curves, machines, strict=True)):
+        curves = {m: curve_of([name if owner == m else "" for owner, name in owners], found, deviations)
+                  for m in left_out}  # fmt: skip
+        falling = [m for m in part if not _rises(curves[m], loads, m)]
+        if not falling:
             whole = np.full((len(rows), design.shape[1]), np.nan)
             whole[rows] = design
-            error = left_out_error(whole, values, per_day)
-            if error < BETTER * least:
-                best, least = (curves, float(found[0])), error
-    if best is not None:
-        return best
-    free = np.r_[-np.inf, np.zeros(design.shape[1] - 1)]
-    held = lsq_linear(design, values[rows], (free, np.inf)).x
-    return [curve_of(mine, held, deviations) for mine in names], float(held[0])
+            return list(curves.values()), float(found[0]), whole
+        for m in falling:
+            left_out[m] += 1
 
 
 def _rises(curve: Curve, loads: Loads, m: int) -> bool:

@@ -98,10 +98,18 @@ class PlantTelemetry:
         name : str
             Of the column.
         """
-        if name not in self.frame:
-            return np.zeros(len(self.frame))
+        return self.bridged(self.frame[name]) if name in self.frame else np.zeros(len(self.frame))
+
+    def bridged(self, values: pd.Series) -> FloatArray:
+        """Bridge short gaps by straight lines, and fill others with zeros, shape (n_time,).
+
+        Parameters
+        ----------
+        values : Series, shape (n_time,)
+            On the steps [any unit].
+        """
         limit = max(round(_BRIDGED / self.step), 1)
-        filled = self.frame[name].astype(float).interpolate(limit=limit, limit_direction="both")
+        filled = values.astype(float).interpolate(limit=limit, limit_direction="both")
         return np.asarray(filled.fillna(0.0), dtype=float)
 
     @property

@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 
+from mpc.kpi.bought import costs_of, fuel_of
 from mpc.kpi.record import PlantRecord, excess
 from mpc.scenario.rates import KILOWATT_HOUR
 from mpc.scenario.scenario import Scenario
@@ -26,12 +27,11 @@ def by_day(record: PlantRecord, scenario: Scenario, since: int = 0) -> pd.DataFr
         Index: local midnights; ``cost`` [currency], ``energy`` bought [kWh], ``discomfort`` of all zones [K h].
     """
     done, step = record.n_steps, scenario.grid.step
-    gas = np.zeros(done) if record.gas is None else record.gas
-    bought = record.electricity * scenario.electricity_price[:done] + gas * scenario.gas_price[:done]
     zone, lower, upper = record.zone_temperature, scenario.lower[:done], scenario.upper[:done]
     outside = excess(lower - zone[:-1], lower - zone[1:])[0] + excess(zone[:-1] - upper, zone[1:] - upper)[0]
     table = {
-        "cost": bought * step / KILOWATT_HOUR, "energy": (record.electricity + gas) * step / KILOWATT_HOUR,
+        "cost": np.sum(costs_of(record, scenario), axis=0),
+        "energy": (record.electricity + fuel_of(record, scenario).power) * step / KILOWATT_HOUR,
         "discomfort": outside.sum(axis=1) * step / 3600.0,
     }  # fmt: skip
     begins = pd.DatetimeIndex(scenario.grid.stamps[:done]) - pd.Timedelta(seconds=step)

@@ -53,7 +53,8 @@ def picture(site: Site, plan: Mapping[str, Any], inputs: Mapping[str, Any]) -> d
         for k, zone in enumerate(zones):
             zones[zone]["expected"] = [round(row[k], 3) for row in ahead["zone"]]
         rule = ahead.get("rule")
-        prices = [of("electricity_price"), of("gas_price")]
+        other = "gas_price" if "gas_price" in table else "district_heating_price"
+        prices = [of("electricity_price"), of(other)]
         hours = ahead["step"] / _JOULES
         rows = [zip(ahead["power"], one, strict=False) for one in prices]
         cost = sum(row[k] * (p or 0.0) * hours for k, one in enumerate(rows) for row, p in one)

@@ -317,6 +317,7 @@ def _scenario(
         electricity_carbon=carbon, gas_carbon=carbon, demand=(), currency=_currency(site), carbon_kind="",
         people=ScheduledOccupancy(dict.fromkeys(zones, 0.0)), heat=SeriesGains(sensible=0.0, latent=0.0, others=heat),
         unmeasured=np.repeat(lacked[list(zones)].to_numpy(), each, axis=0),
+        district_price=price("district_heating") if "district_heating_price" in now else None,
     )  # fmt: skip
 
 

@@ -46,7 +46,10 @@ def _prices(study: Study | SeenStudy) -> list[tuple[str, str]]:
     both = (scenario.electricity_price, scenario.gas_price)
     electricity, gas = (listed_prices(of[:n], scenario.currency) for of in both)
     burnt = [("gas price", f"{gas} per kWh of upper heating value")] if np.any(scenario.gas_price[:n]) else []
-    return [("electricity price", f"{electricity} per kWh"), *burnt]
+    district = [] if scenario.district_price is None else [
+        ("district heating price", f"{listed_prices(scenario.district_price[:n], scenario.currency)} per kWh")
+    ]  # fmt: skip
+    return [("electricity price", f"{electricity} per kWh"), *burnt, *district]
 
 
 def _discomfort(study: Study | SeenStudy) -> tuple[str, str]:

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from calibration.results import Content
+from mpc.kpi.bought import fuel_of
 from mpc.kpi.kpis import Kpis
 from mpc.reports.assumptions import assumption_rows
 from mpc.reports.comparison import comparison_table
@@ -219,6 +220,9 @@ def trajectory(run: ControlRun) -> pd.DataFrame:
     columns["electricity_price"], columns["gas_price"] = scenario.electricity_price[:n], scenario.gas_price[:n]
     columns["true/electricity"] = record.electricity
     columns["true/gas"] = np.zeros(n) if record.gas is None else record.gas
+    if record.district_heating is not None and scenario.district_price is not None:
+        columns["district_heating_price"] = scenario.district_price[:n]
+        columns["true/district_heating"] = record.district_heating
     table = pd.DataFrame(columns, index=frame.index)
     table.attrs["units"] = {name: _unit_of(name, scenario.currency) for name in columns}
     return table
@@ -228,7 +232,7 @@ def _unit_of(name: str, currency: str) -> str:
     """Give the unit of a column of the course."""
     if name.endswith("_price"):
         return f"{currency}/kWh"
-    if name in ("true/electricity", "true/gas"):
+    if name in ("true/electricity", "true/gas", "true/district_heating"):
         return "W"
     point = name.rpartition("/")[2]
     return QUANTITIES[POINT_TYPES[point].quantity].file_unit if point in POINT_TYPES else "degC"
@@ -255,9 +259,9 @@ def control_verdict(run: ControlRun) -> str:
         Of `run_controller`.
     """
     k, worst = run.kpis, max(run.kpis.zones, key=lambda z: z.below + z.above)
-    powers = (run.loop.record.electricity, run.loop.record.gas)
-    electricity, gas = (0.0 if power is None else float(power.sum()) for power in powers)
-    shared = f", of which {percent(electricity / max(electricity + gas, 1e-9))} electricity" if gas else ""
+    record = run.loop.record
+    electricity, other = float(record.electricity.sum()), float(fuel_of(record, run.study.scenario).power.sum())
+    shared = f", of which {percent(electricity / max(electricity + other, 1e-9))} electricity" if other else ""
     parts = [
         f"{run.entry.title.capitalize()} spent {money(run.cost, k.currency)} on energy in "
         f"{duration(3600.0 * k.hours)} ({significant(k.ener_tot)} kWh/m²{shared})."

@@ -90,7 +90,13 @@ class PlantStudy:
         """Zones and place."""
         file = self.description
         areas = {name: zone.floor_area for name, zone in file.zones.items()}
-        return Site(file.name, areas, file.location, () if file.source is None else file.source.capacity)
+        return Site(file.name, areas, file.location, self._sheet)
+
+    @property
+    def _sheet(self) -> tuple[tuple[float, float], ...]:
+        """Data sheet of one source for all that is identified."""
+        source = self.description.source
+        return () if source is None else source.cooling if self.cooling else source.heating
 
     def plant(self) -> Any:
         """Make the plant, to be reset, and freed by leaving a ``with`` block."""
@@ -155,8 +161,8 @@ class PlantStudy:
         of_machines = [a for a in actuators if electric is None or a.name != electric.command]
         sheets = {name: told[name].capacity for name in told}
         found = find_machines(of_machines, columns, zones, self.actuators, sheets, cooling=self.cooling)
-        if self.description.source is not None:
-            check_terminals(found)
+        if self._sheet:
+            check_terminals(found, self.description.zones)
         return found
 
     def seen_machines(self, seen: PlantTelemetry) -> tuple[Machine, ...]:

@@ -15,11 +15,13 @@ from mpc.control.identified.action import PlannedAction
 from mpc.control.predictor.predictor import Predictor
 from mpc.errors import ControlError
 from mpc.identify.telemetry import on_control_steps, run_recorded
+from mpc.kpi.bought import costs_of, fuel_of
 from mpc.kpi.kpis import Kpis, measure_kpis
 from mpc.loop.plant import Controller, Measurements
 from mpc.loop.run import ClosedLoopRun, run_closed_loop
 from mpc.loop.simulated import SimulatedPlant
 from mpc.scenario.forecast import Forecast
+from mpc.scenario.rates import KILOWATT_HOUR
 from mpc.studies.described import PlantStudy, RecordedPlant, SeenStudy
 from mpc.studies.optimal_control import MODEL_STEP
 from mpc.studies.registry import RegisteredController, find_controller
@@ -232,14 +234,14 @@ def prediction_errors(run: ControlRun) -> dict[str, Any]:
         return {}
     record, scenario = run.loop.record, run.study.scenario
     ahead = round(AHEAD / record.step)
+    costs, unit = costs_of(record, scenario), record.step / KILOWATT_HOUR
+    prices = [unit * price for price in (scenario.electricity_price, fuel_of(record, scenario).price)]
     error, expected, came = [], 0.0, 0.0
     for first, decision in rows:
         error.append(decision.zone - record.zone_temperature[first + ahead])
         part = slice(first, first + ahead)
-        prices = scenario.electricity_price[part], scenario.gas_price[part]
-        gas = np.zeros(ahead) if record.gas is None else record.gas[part]
-        came += float(prices[0] @ record.electricity[part] + prices[1] @ gas)
-        expected += float(prices[0].sum() * decision.power[0] + prices[1].sum() * decision.power[1])
+        came += float(sum(cost[part].sum() for cost in costs))
+        expected += float(sum(price[part].sum() * power for price, power in zip(prices, decision.power, strict=True)))
     return {
         "zone_mae": float(np.mean(np.abs(error))), "zone_bias": float(np.mean(error)),
         "cost_error": expected / came - 1.0 if came > 0.0 else 0.0, "count": len(rows),

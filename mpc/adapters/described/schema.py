@@ -144,12 +144,13 @@ class SharedSource(Entry):
 
     Parameters
     ----------
-    capacity : tuple of tuple of float
-        Its data sheet: outdoor temperatures [K], rising, and the most heat that it gives at each, or takes where it
-        cools [W].
+    heating, cooling : tuple of tuple of float
+        Data sheets of what gives heat, and of what takes it: outdoor temperatures [K], rising, and the most at each
+        [W].
     """
 
-    capacity: Annotated[DataSheet, Field(min_length=1)]
+    heating: DataSheet = ()
+    cooling: DataSheet = ()
 
 
 class Comfort(Entry):

@@ -8,6 +8,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from mpc.kpi.bought import Fuel, costs_of, fuel_of
 from mpc.reports.figures import style
 from mpc.reports.figures.style import CELSIUS, MEASURED, MUTED, SIMULATED, Picture, picture, styled
 from mpc.reports.means import NOTICED
@@ -42,9 +43,10 @@ def course(run: ControlRun) -> list[Picture]:
     )
     x = style.lines_over_time(power, run.study.stamps, ticks=9)
     prices.step(x, scenario.electricity_price[:n], where="pre", color=MEASURED, label="electricity")
-    burns = bool(np.any(_gas(run)))
+    fuel = _fuel(run)
+    burns = bool(np.any(fuel.power))
     if burns:
-        prices.step(x, scenario.gas_price[:n], where="pre", color=SIMULATED, label="gas")
+        prices.step(x, fuel.price[:n], where="pre", color=SIMULATED, label=fuel.name)
     prices.set(title="Prices", ylabel=f"[{scenario.currency}/kWh]")
     prices.set_ylim(bottom=0.0)
     weather.plot(x, scenario.outdoor[:n] - CELSIUS, color=MEASURED, label="outdoor air")
@@ -54,7 +56,7 @@ def course(run: ControlRun) -> list[Picture]:
     right.set_ylim(bottom=0.0)
     _zones(zones, run, x)
     _setpoints(setpoints, run)
-    bought = {"electricity": record.electricity[:n] / _KILO} | ({"gas": _gas(run) / _KILO} if burns else {})
+    bought = {"electricity": record.electricity[:n] / _KILO} | ({fuel.name: fuel.power / _KILO} if burns else {})
     power.stackplot(
         x, *bought.values(), labels=list(bought), colors=[MEASURED, SIMULATED], alpha=0.75, step="pre",
     )  # fmt: skip
@@ -132,9 +134,8 @@ def _actions(run: ControlRun, kind: str) -> pd.DataFrame:
     return run.loop.actions.filter(regex=f"{kind}$") - CELSIUS
 
 
-def _gas(run: ControlRun) -> FloatArray:
-    record = run.loop.record
-    return np.zeros(record.n_steps) if record.gas is None else record.gas
+def _fuel(run: ControlRun) -> Fuel:
+    return fuel_of(run.loop.record, run.study.scenario)
 
 
 @styled
@@ -150,7 +151,8 @@ def expectations(run: ControlRun) -> list[Picture]:
     if len(rows) < 2:  # a point is no course
         return []
     record, ahead = run.loop.record, round(AHEAD / run.loop.record.step)
-    took = record.electricity + _gas(run)
+    fuel = _fuel(run)
+    took = record.electricity + fuel.power
     zone = [float(record.zone_temperature[first + ahead].mean()) - CELSIUS for first, _ in rows]
     power = [float(took[first : first + ahead].mean()) / _KILO for first, _ in rows]
     figure = Figure(figsize=(10.0, 5.4))
@@ -164,7 +166,7 @@ def expectations(run: ControlRun) -> list[Picture]:
         axes.plot(x, expected, color=SIMULATED, linewidth=1.0, label=when)
         _legend(axes)
     upper.set(title="Mean temperature of the zones", ylabel="[°C]")
-    what = "Electricity and gas" if np.any(_gas(run)) else "Electricity"
+    what = f"Electricity and {fuel.name}" if np.any(fuel.power) else "Electricity"
     lower.set(title=f"{what}, mean of the hour", ylabel="[kW]")
     return [picture(figure, "Expected and realised zone temperatures and power", zoom=True)]
 
@@ -187,7 +189,8 @@ def side_by_side(runs: Sequence[ControlRun]) -> list[Picture]:
     for run in runs:
         colour = _COLOURS.get(run.controller) or _OWN[next(own) % len(_OWN)]
         line = {"color": colour, "linewidth": 1.2, "linestyle": "--" if run.controller == "bound" else "-"}
-        cost.plot(x, np.cumsum(np.sum(_costs(run), axis=0)), label=run.entry.title, **line)
+        each = costs_of(run.loop.record, run.study.scenario)
+        cost.plot(x, np.cumsum(np.sum(each, axis=0)), label=run.entry.title, **line)
         zone = run.loop.record.zone_temperature[1 : study.steps + 1] - CELSIUS
         zones.plot(x, zone.min(axis=1), **line)
         zones.plot(x, zone.max(axis=1), **line)
@@ -227,10 +230,11 @@ def cost_bars(runs: Sequence[ControlRun]) -> list[Picture]:
         figure.subplots(1, 1 + some, sharey=True, gridspec_kw={"width_ratios": [2.0, 1.0][: 1 + some]})
     )
     place = np.arange(len(runs))
-    electricity, gas = np.array([[part.sum() for part in _costs(run)] for run in runs]).T
+    costs = [costs_of(run.loop.record, run.study.scenario) for run in runs]
+    electricity, other = np.array([[part.sum() for part in parts] for parts in costs]).T
     left.barh(place, electricity, color=MEASURED, alpha=0.8, label="electricity")
-    if gas.any():
-        left.barh(place, gas, left=electricity, color=SIMULATED, alpha=0.8, label="gas")
+    if other.any():
+        left.barh(place, other, left=electricity, color=SIMULATED, alpha=0.8, label=_fuel(runs[0]).name)
     left.set_yticks(place, [run.entry.title for run in runs])
     left.invert_yaxis()
     left.set_xlabel(f"energy cost [{runs[0].study.scenario.currency}]")
@@ -251,9 +255,3 @@ def _outside_so_far(run: ControlRun) -> FloatArray:
     outside = np.maximum(np.maximum(scenario.lower[:n] - zone, zone - scenario.upper[:n]), 0.0)
     return np.asarray(np.cumsum(outside.mean(axis=1)) * run.loop.record.step / 3600.0)
 
-
-def _costs(run: ControlRun) -> tuple[FloatArray, FloatArray]:
-    """Give what electricity and gas cost, step by step, each of shape (n_steps,) [currency]."""
-    record, scenario, n = run.loop.record, run.study.scenario, run.study.steps
-    unit = record.step / 3.6e6
-    return scenario.electricity_price[:n] * record.electricity * unit, scenario.gas_price[:n] * _gas(run) * unit

@@ -15,6 +15,7 @@ from mpc.baselines.plants import FullSpeed
 from mpc.control.identified.beyond import PowerLearner
 from mpc.control.identified.controller import IdentifiedController
 from mpc.control.identified.electric import Electric
+from mpc.control.identified.thermostats import Thermostats
 from mpc.errors import PlantError
 from mpc.identify.curves import Curve
 from mpc.identify.excitation import Excitation, ExcitationSettings
@@ -196,10 +197,33 @@ def test_heat_of_supply_air_is_as_good_as_a_meter(recorded: dict[str, FloatArray
     found, metered = identify(by_air, [machine]), identify(telemetry, [machine_of("south", sign)])
     np.testing.assert_allclose(found.loads.level, metered.loads.level, atol=1e-9)
     np.testing.assert_allclose(found.model.maps[0].limits, metered.model.maps[0].limits)
+    gap = by_air.frame.copy()
+    gap.iloc[100:150, gap.columns.get_loc(f"south/{ZONE_TEMPERATURE}")] = np.nan  # twelve hours are no 0 K
+    assert machine.full(replace(by_air, frame=gap)) == pytest.approx(machine.full(by_air), rel=0.05)
     again = PlantModel.from_dict(found.model.to_dict()).maps[0].machine
     layout = PointLayout(again.air, "Etc/GMT-1")
     assert again.given(Measurements(layout, 0, [0.2, 293.0 + sign * 5.0, 293.0])) == pytest.approx(1006.0)
     assert np.isnan(again.given(Measurements(PointLayout(again.air[:2], "Etc/GMT-1"), 0, [0.2, 300.0])))
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_data_sheet_of_a_source_is_a_share_of_all_full_loads(recorded: dict[str, FloatArray], sign: float) -> None:
+    telemetry = telemetry_of(sign, recorded)
+    later = telemetry.frame.shift(8).bfill()  # the same room, two hours later
+    both = {f"north/{p}": later[f"south/{p}"] for p in (ZONE_TEMPERATURE, HEATING_POWER)}
+    both[f"{SET}{setpoint_of('north', sign)}"] = later[f"{SET}{setpoint_of('south', sign)}"]
+    sheet = pairs_as_heated(((255.0, 2000.0), (280.0, 4500.0)), sign)
+    site = Site("rooms", {"south": 40.0, "north": 40.0}, PLACE, sheet)
+    machines = [machine_of(room, sign) for room in ROOMS]
+    found = identify(replace(telemetry, frame=telemetry.frame.assign(**both), site=site), machines).model
+    whole = float(found.led_heat.sum())
+    assert [pair[1] * whole for pair in pairs_as_heated(found.sheet, sign)] == pytest.approx([2000.0, 4500.0])
+    again = PlantModel.from_dict(found.to_dict())
+    assert again.sheet == found.sheet
+    told = Thermostats(again).together(np.array([as_heated(255.0, sign)] * 2))
+    assert told[1] == pytest.approx(0.95 * 2000.0 / whole, rel=0.1) and told[0] < 0.5
+    with pytest.raises(PlantError, match="source: expected setpoints of all zones"):
+        identify(replace(telemetry, site=replace(site, areas={"south": 40.0})), machines[:1])
 
 
 def test_setpoints_of_cooling_are_chosen_when_they_are_asked_for() -> None:

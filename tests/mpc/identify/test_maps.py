@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from mpc.errors import PlantError
-from mpc.identify.curves import interval_of
+from mpc.identify.curves import Curve, interval_of
 from mpc.identify.machines import Machine, find_machines
 from mpc.identify.maps import map_machines
-from mpc.identify.regression import Loads, regress
+from mpc.identify.regression import Loads, regress, regress_power
 from mpc.loop.actuators import Actuator
 
 SPEED = Machine(Actuator("hp/speed", "1", 0.0, 1.0, kind="continuous"), "machine", ("a",), "hp/heating_power_sensor")
@@ -98,3 +98,39 @@ def test_which_actuators_are_controlled() -> None:
         find_machines([actuator("ahu/supply_air_temperature_setpoint", "K")], [], ["house"])
     with pytest.raises(PlantError, match="heat_pump/speed"):
         find_machines(house, [], ["house"], ["heat_pump/speed"])
+
+
+def test_more_load_of_no_room_seems_to_cost_less() -> None:
+    """Five rooms that move together, of which the last is heated by gas: baseboards of 3 kW, COP 1."""
+    rng, n, rooms = np.random.default_rng(5), 14 * 96, 5
+    common = np.clip(0.5 + 0.3 * np.sin(np.arange(n)[:, None] / 15.0) + 0.02 * rng.normal(size=(n, 1)), 0.0, 1.0)
+    level = np.clip(common + 0.02 * rng.normal(size=(n, rooms)), 0.0, 1.0)
+    outdoor = 275.0 + 5.0 * np.sin(np.arange(n) / 60.0)
+    given = Loads(level, outdoor, 298.0 + 2.0 * common + 0.1 * rng.normal(size=(n, rooms)))
+    electricity = 800.0 + 3000.0 * level[:, :4].sum(axis=1) + 150.0 * rng.normal(size=n)
+    weather, u = (outdoor[0], outdoor[30]), np.linspace(0.0, 1.0, 3)
+
+    def falls(curve: Curve) -> bool:
+        free = curve.without_standing()
+        return any((np.diff(free(1.0, u, t, 299.0)) < -1e-9).any() for t in weather)
+
+    all_features, _ = regress(given, electricity, range(rooms))
+    assert any(falls(curve) for curve in all_features)
+    curves, base = regress_power(given, electricity, range(rooms), 96)
+    assert not any(falls(curve) for curve in curves) and base == pytest.approx(800.0, abs=60.0)
+    full = [float(curve.without_standing()(1.0, 1.0, 275.0, 299.0)) for curve in curves]
+    assert full[:4] == pytest.approx([3000.0] * 4, rel=0.2) and abs(full[4]) < 600.0
+
+
+def test_a_machine_that_buys_nothing_leaves_the_others_their_weather() -> None:
+    """A heat pump beside a boiler, which takes no electricity."""
+    for seed in range(6):
+        rng, n = np.random.default_rng(seed), 14 * 96
+        level = np.repeat(rng.uniform(0.0, 1.0, (n // 8, 2)), 8, axis=0) * (rng.uniform(size=(n // 8, 2)) > 0.3).repeat(8, axis=0)
+        outdoor, floor = 275.0 + 5.0 * np.sin(np.arange(n) / 60.0), 300.0 + 4.0 * np.cos(np.arange(n) / 40.0)
+        u = level[:, 0]
+        power = 300.0 * (u > 0.0) + u * (2500.0 - 40.0 * (outdoor - 280.15) + 50.0 * (floor - 303.15))
+        curves, _ = regress_power(Loads(level, outdoor, np.column_stack([floor, floor])), power + 50.0 * rng.normal(size=n), [0, 1], 96)
+        told = [float(curves[0](1.0, 1.0, *at)) for at in ((270.0, 300.0), (280.0, 300.0), (280.0, 305.0))]
+        assert np.diff(told) == pytest.approx([-400.0, 250.0], abs=50.0)
+        assert abs(float(curves[1].without_standing()(1.0, 1.0, 275.0, 300.0))) < 60.0

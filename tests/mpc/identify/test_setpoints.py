@@ -120,11 +120,13 @@ def test_a_data_sheet_is_of_a_setpoint_whose_heat_is_measured() -> None:
 
 
 def test_a_data_sheet_of_one_source_is_of_several_setpoints_whose_heat_is_measured() -> None:
-    machines = [replace(led().maps[0].machine, heat=f"{room}/heating_power_sensor") for room in ("north", "south")]
-    check_terminals(machines)
-    for refused in (machines[:1], [machines[0], replace(machines[1], heat="")]):
-        with pytest.raises(PlantError, match="source.capacity: expected two setpoints or more, whose heat is measured"):
-            check_terminals(refused)
+    rooms = ("north", "south")
+    machines = [replace(led().maps[0].machine, heat=f"{room}/heating_power_sensor", serves=(room,)) for room in rooms]
+    check_terminals(machines, rooms)
+    air = replace(machines[1], heat="", air=("south/flow", "south/supply", "south/zone"))
+    for refused, zones in ((machines[:1], rooms[:1]), ([machines[0], air], rooms), (machines, (*rooms, "east"))):
+        with pytest.raises(PlantError, match="source: expected setpoints of all zones, two at least, whose heat is m"):
+            check_terminals(refused, zones)
 
 
 def test_limits_are_read_from_the_steps_at_which_more_was_wanted() -> None:

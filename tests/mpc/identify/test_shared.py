@@ -159,6 +159,11 @@ def test_a_data_sheet_says_what_a_source_has_in_weather_that_was_never_seen() ->
             shared.learn(253.0, np.full(2, 0.35), ~every, limits)
         risen.append(float(shared.at(weather)[1]))
     assert 0.3 * less[1] + 0.02 < risen[0] < risen[1] == pytest.approx(0.35)
+    more = SharedLimit(np.full(2, FULL), STEP, (), sheet)
+    for load in (0.605, 0.66):  # an hour of more than it says is no reason to rely on less anywhere
+        for _ in range(4):
+            more.learn(268.0, np.full(2, load), ~every, limits)
+        assert (more.at(weather) >= np.array([0.3, 0.3, 0.6, 0.9]) - 1e-9).all()
     model = replace(_office(), shared=(), sheet=((253.0, 0.3), (283.0, 1.5)))
     ahead = Thermostats(model).together(np.array([253.0, 253.0, 283.0]))
     assert ahead[0] > ahead[1] > 0.3 * 0.95 and ahead[0] < 0.33 and np.isinf(ahead[2])  # terminals alone reach 1

@@ -221,7 +221,9 @@ def test_a_source_of_the_guide_needs_terminals_of_several_zones(folder: Path) ->
     study = PlantStudy(folder / "plant.yaml")
     expected = np.array([[253.15, 13800.0], [273.15, 31400.0], [293.15, 49000.0]])
     np.testing.assert_allclose(study.site.capacity, expected)
-    with study.plant() as plant, pytest.raises(PlantError, match="source.capacity: expected two setpoints or more"):
+    cooled = PlantStudy(folder / "plant.yaml", cooling=True).site.capacity
+    np.testing.assert_allclose(cooled, [[278.15, 50800.0], [318.15, 36400.0]])
+    with study.plant() as plant, pytest.raises(PlantError, match="source: expected setpoints of all zones, two at leas"):
         study.machines(plant)
 
 
@@ -255,8 +257,8 @@ EDITS: list[tuple[dict[str, Any], str]] = [
     ({"actuators": {SPEED: {"signal": "oveHeaPumY_u", "kind": "stepped"}}}, f"actuators.{SPEED}.kind"),
     ({"actuators": {SETPOINT: {"signal": "oveTSet_u", "capacity": [["7 degC", 9000], ["-5 degC", 7000]]}}},
      "expected a capacity over rising outdoor temperatures, found [280.15, 268.15] K"),
-    ({"source": {"capacity": [["7 degC", 9000], ["-5 degC", 7000]]}},
-     "source.capacity: expected a capacity over rising outdoor temperatures, found [280.15, 268.15] K"),
+    ({"source": {"heating": [["7 degC", 9000], ["-5 degC", 7000]]}},
+     "source.heating: expected a capacity over rising outdoor temperatures, found [280.15, 268.15] K"),
     ({"source": {"capacity": []}}, "source.capacity"),
     ({"energy": {"district_heating": ["reaQFloHea_y"]}}, "expected prices.district_heating, which is bought, found none"),
     ({"actuators": {SPEED: "oveHeaPumX_u"}}, "'oveHeaPumX_u'; the nearest valid one is 'oveHeaPumY_u'"),

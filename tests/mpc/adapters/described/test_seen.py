@@ -16,7 +16,10 @@ from mpc.adapters.described.schema import PlantFile
 from mpc.adapters.described.seen import seen_scenario
 from mpc.errors import PlantError
 from mpc.identify.excitation import ExcitationSettings
+from mpc.kpi.bought import fuel_of
+from mpc.kpi.daily import by_day
 from mpc.kpi.kpis import measure_kpis
+from mpc.reports.control import trajectory, write_control
 from mpc.studies.described import PlantStudy
 from mpc.studies.excited import run_experiment
 from mpc.studies.run import run_controller
@@ -61,6 +64,13 @@ def test_indicators_of_a_server_are_those_of_the_units_file(
         assert own.kpis.ener_tot == pytest.approx(heat + electricity) and heat > 0.0
         assert own.kpis.cost_tot == pytest.approx(0.08 * heat + 0.3 * electricity)
         assert remote.kpis.emis_tot == pytest.approx(0.1 * heat + 0.2 * electricity)
+        day, fuel = by_day(record, own.study.scenario).sum(), fuel_of(record, own.study.scenario)
+        assert day["cost"] == pytest.approx(192.0 * own.kpis.cost_tot)
+        assert day["energy"] == pytest.approx(192.0 * own.kpis.ener_tot) and fuel.name == "district heating"
+        page = write_control(own, described.parent / "control").read_text(encoding="utf-8")
+        assert "district heating price" in page
+        table = trajectory(own)
+        assert {"district_heating_price", "true/district_heating"} <= {*table}
     made = run_experiment(PlantStudy(described, boptest_url, **START), 1, ExcitationSettings())
     assert {"heat_pump/compressor_speed", "electricity", "electricity_price"} <= {
         c.removeprefix("set/") for c in made.telemetry.frame
