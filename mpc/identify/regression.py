@@ -189,7 +189,7 @@ def regress_power(
     of heat, which a controller would take for a source of money. So of a machine whose power does not rise with its
     load in the weather that was seen features are left out until it does; one whose heat itself seems to have a
     negative price has no part in what is bought. More is left out, the same of all, while that predicts left-out days
-    a tenth better.
+    a tenth better. Of machines that buy less the more they give, such as cogeneration, nothing is known.
 
     Parameters
     ----------
@@ -198,7 +198,7 @@ def regress_power(
     values : ndarray, shape (n_time,)
         Bought [W].
     machines : sequence of int
-        Which machines may have a part in it.
+        One at least, which may have a part in it.
     per_day : int
         Steps of a day.
 
@@ -214,17 +214,17 @@ def regress_power(
     PlantError
         When there are too few steps with known loads.
     """
-    left_out, least = dict.fromkeys(machines, 0), np.inf
-    best: tuple[list[Curve], float] = [], 0.0
-    while True:
-        curves, base, design = _rising(loads, values, left_out)
-        error = left_out_error(design, values, per_day)
-        if not error < BETTER * least:
-            return best
-        best, least = (curves, base), error
-        if min(left_out.values(), default=_NO_PART) == _NO_PART:
-            return best
+    left_out = dict.fromkeys(machines, 0)
+    curves, base, design = _rising(loads, values, left_out)
+    error = left_out_error(design, values, per_day)
+    while min(left_out.values()) < _NO_PART:
         left_out = {m: min(count + 1, _NO_PART) for m, count in left_out.items()}
+        smaller = _rising(loads, values, left_out)
+        found = left_out_error(smaller[2], values, per_day)
+        if not found < BETTER * error:
+            break
+        (curves, base, _), error = smaller, found
+    return curves, base
 
 
 def _rising(loads: Loads, values: FloatArray, left_out: dict[int, int]) -> tuple[list[Curve], float, FloatArray]:
