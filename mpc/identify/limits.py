@@ -52,8 +52,7 @@ class HeatLimit:
         Outdoor air [K], rising, and largest load [-] of a data sheet, on straight lines between them: the mean of the
         prior. Sheets have edges, where a compressor stops or a resistance comes in: the mean of the loads within the
         error of an outdoor temperature is relied on, and a reading between them says nothing. Their least would have a
-        building heated all day for a compressor that may stop at night. Where readings are no less than it says, it is
-        relied on itself.
+        building heated all day for a compressor that may stop at night.
 
     Examples
     --------
@@ -109,13 +108,17 @@ class HeatLimit:
             Its standard deviation where it is forecast [K].
         """
         mean, deviation = self._posterior(outdoor, error)
-        if not self._bins:
-            return mean
-        careful = np.maximum(mean - deviation, _LEAST)
-        if not self.sheet:
-            return np.asarray(careful)
-        told = self._near(outdoor, error).mean(axis=0)  # more than the sheet says is no reason to rely on less
-        return np.asarray(np.where(mean >= told, np.maximum(careful, told), careful))
+        return mean if not self._bins else np.asarray(np.maximum(mean - deviation, _LEAST))
+
+    def expected(self, outdoor: FloatArray, error: FloatArray | float = 0.0) -> FloatArray:
+        """Load that is expected before anything was seen, shape (n,) [-].
+
+        Parameters
+        ----------
+        outdoor, error : ndarray, shape (n,), or float
+            As of `at` [K].
+        """
+        return np.asarray(self._near(outdoor, error).mean(axis=0))
 
     def likely(self, outdoor: FloatArray) -> FloatArray:
         """Load that is expected, shape (n,) [-].
@@ -129,7 +132,7 @@ class HeatLimit:
 
     def _posterior(self, outdoor: FloatArray, error: FloatArray | float) -> tuple[FloatArray, FloatArray]:
         """Mean and standard deviation of the load, shape (n,) [-]."""
-        expected: FloatArray = self._near(outdoor, error).mean(axis=0)
+        expected = self.expected(outdoor, error)
         level, slope, shape = self._spreads
         variance = self._mean(outdoor) ** 2 * (level**2 + (slope * (outdoor - _AT)) ** 2 + shape**2)
         if not self._bins:

@@ -114,6 +114,9 @@ class SharedLimit:
         known = self._limit.at(outdoor, error)
         if not self.sheet:
             known = np.where(outdoor > self.readings[-1][0] + BIN, np.inf, known)
+        else:  # readings that are no less than the sheet says are no reason to rely on less
+            told = self._limit.expected(outdoor, error)
+            known = np.where(self._limit.likely(outdoor) >= told - 1e-9, np.maximum(known, told), known)
         return np.maximum(known, self.shown(outdoor))
 
     def shown(self, outdoor: FloatArray) -> FloatArray:
