@@ -36,6 +36,7 @@ def record(site: Site, plant: Any, days: int = 1) -> None:
     log.close()
 
 
+@pytest.mark.long
 def test_a_recorded_day_is_run_through_anew(office_site: Callable[[float], Any], tmp_path: Path) -> None:
     """The own control costs by the model what it did in the building, as the heat that the model lacks is found."""
     device, plant, path = office_site(1.0)

@@ -162,6 +162,7 @@ def test_what_a_device_is_told_becomes_a_value_of_the_actuator(script: Callable[
     assert [taken(switch, value) for value in (0.4, 0.6, 7.0)] == [0.0, 1.0, 1.0]
 
 
+@pytest.mark.long
 def test_an_office_with_air_handlers_is_a_site_and_is_planned_by_its_building(
     office_site: Callable[[float], Any], tmp_path: Path
 ) -> None:
