@@ -12,8 +12,6 @@ from calibration.grey_box.judge import LeadError, judge
 from calibration.grey_box.network import GreyBox
 from mpc.errors import PlantError
 from mpc.identify.curves import EMITTER
-from mpc.identify.hours import RunningHours, hours_of
-from mpc.identify.limits import RUNS
 from mpc.identify.machines import Machine, as_heated, check_terminals, pairs_as_heated
 from mpc.identify.maps import led_heat, map_machines
 from mpc.identify.model import PlantModel
@@ -111,15 +109,12 @@ def identify(telemetry: PlantTelemetry, machines: Sequence[Machine], progress: P
     outdoor = as_heated(loads.outdoor, sign)
     whole = float(np.maximum(led_heat(maps), 0.0).sum())
     sheet = tuple((at, heat / whole) for at, heat in telemetry.site.capacity)
-    hours = RunningHours.of(telemetry.step, (), len(machines))
-    clock = hours_of(telemetry.frame.index, telemetry.step, telemetry.site.location.timezone)
-    hours.learn(clock, wanted, loads.level > RUNS)
     held_back = shared_of(
         led_heat(maps), telemetry.step, outdoor, loads.level, wanted, alone, pairs_as_heated(sheet, sign)
     )
-    notes = _notes(telemetry, machines, suns, hours)
+    notes = _notes(telemetry, machines, suns)
     shared = pairs_as_heated(held_back, sign)
-    model = PlantModel(telemetry.site.name, telemetry.step, box, maps, base | left, shared, source, sheet, hours.counts)
+    model = PlantModel(telemetry.site.name, telemetry.step, box, maps, base | left, shared, source, sheet)
     return Identified(model, telemetry, data, loads, tuple(errors), split, notes)
 
 
@@ -169,15 +164,8 @@ def _above(telemetry: PlantTelemetry, machines: Sequence[Machine]) -> FloatArray
     return np.column_stack(columns)
 
 
-def _notes(
-    telemetry: PlantTelemetry, machines: Sequence[Machine], suns: Sequence[str], hours: RunningHours
-) -> tuple[str, ...]:
+def _notes(telemetry: PlantTelemetry, machines: Sequence[Machine], suns: Sequence[str]) -> tuple[str, ...]:
     notes = []
-    for machine, closed in zip(machines, hours.closed, strict=True):
-        if closed.any():
-            days = (("working days", closed[:24]), ("week-ends", closed[24:]))
-            told_of = [f"{', '.join(map(str, np.flatnonzero(of)))} h of {day}" for day, of in days if of.any()]
-            notes.append(f"{machine.name} was asked for heat at {' and '.join(told_of)}, in vain: none is planned then")
     for machine in machines:
         if machine.air:
             notes.append(f"heat of {machine.name} is that of its supply air, {machine.meter}")

@@ -54,9 +54,6 @@ class PlantModel:
     sheet : tuple of tuple of float
         Of one source for all of them, by its data sheet: outdoor air [K], rising, and their largest load together as
         such a share [-].
-    hours : tuple
-        Steps in which each machine was asked for heat, and gave some, by the hour, see `RunningHours`, shape
-        (n_machine, 2, 48) [-]; empty where nothing is known.
     """
 
     name: str
@@ -67,7 +64,6 @@ class PlantModel:
     shared: tuple[tuple[float, float], ...] = ()
     source: Source | None = None
     sheet: tuple[tuple[float, float], ...] = ()
-    hours: tuple[tuple[tuple[float, ...], ...], ...] = ()
 
     @property
     def sign(self) -> float:
@@ -158,7 +154,6 @@ class PlantModel:
             "format": FORMAT, "name": self.name, "step": self.step, "grey_box": self.box.to_dict(), "machines": maps,
             "base": dict(self.base), "source": None if self.source is None else asdict(self.source),
             "shared": [list(pair) for pair in self.shared], "sheet": [list(pair) for pair in self.sheet],
-            "hours": self.hours,
         }  # fmt: skip
 
     @classmethod
@@ -182,8 +177,7 @@ class PlantModel:
             box = GreyBox.from_dict(content["grey_box"])
             shared, sheet = (tuple((float(t), float(load)) for t, load in content[key]) for key in ("shared", "sheet"))
             base, source = dict(content["base"]), _source_of(content["source"])
-            hours = tuple(tuple(tuple(map(float, steps)) for steps in counts) for counts in content["hours"])
-            return cls(str(content["name"]), float(content["step"]), box, maps, base, shared, source, sheet, hours)
+            return cls(str(content["name"]), float(content["step"]), box, maps, base, shared, source, sheet)
         except (KeyError, TypeError, ValueError, MpcError, CalibrationError) as error:
             raise ControlError(where, expected, f"{type(error).__name__}: {error}") from error
 

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from mpc.control.identified.beyond import WEIGHTS
-from mpc.identify.hours import hours_of
 from mpc.identify.machines import as_heated
 from mpc.identify.model import PlantModel
 from mpc.identify.telemetry import CARRIERS, facade_sun
 from mpc.scenario.forecast import Forecast
-from thermal._types import FloatArray, IntArray
+from thermal._types import FloatArray
 from thermal.case.building import Location
 from thermal.case.points import OUTDOOR_TEMPERATURE
 
@@ -41,8 +40,6 @@ class Ahead:
         Weights of what machines buy beyond their maps, see `mpc.control.identified.beyond` [W].
     together : ndarray, shape (N,)
         Largest load of all machines that setpoints lead, a share of their full loads; infinite where none is known [-].
-    hours : ndarray, shape (N,)
-        As of `mpc.identify.hours.hours_of`; empty where no hour is told from another.
     """
 
     outdoor: FloatArray
@@ -54,7 +51,6 @@ class Ahead:
     occupied: np.ndarray
     beyond: FloatArray
     together: FloatArray
-    hours: IntArray = field(default_factory=lambda: np.empty(0, dtype=int))
 
     def edges(self, sign: float) -> tuple[FloatArray, FloatArray]:
         """Give the edges that machines keep zones from, and those beyond which they never drive them, as `as_heated`.
@@ -112,5 +108,4 @@ class Ahead:
             columns(of_zones("internal_gain")) + model.box.parts["constant gain"],
             columns([*_PRICES.values()]), columns(edges[0]), columns(edges[1]), occupied,
             np.zeros((len(table), len(model.maps), WEIGHTS)), np.full(len(table), np.inf),
-            hours_of(table.index, model.step, location.timezone),
         )  # fmt: skip

@@ -230,7 +230,7 @@ class IdentifiedController:
             return
         before, levels = self._before
         outdoor = self._observer.outdoor(measurements, before)
-        self._thermostats.learn(measurements, self._observer.zones(measurements), outdoor, before.hours[:1])
+        self._thermostats.learn(measurements, self._observer.zones(measurements), outdoor)
         self._learner.learn(measurements, levels, outdoor, self._observer.state)
         self._observer.update(measurements, before, levels)
         kept = before.edges(self.model.sign)[0][:1]
@@ -251,7 +251,7 @@ class IdentifiedController:
     def _decided(self, ahead: Ahead) -> StageSolution | None:
         """Plan, with the first steps of machines in duty whole."""
         count, m = len(ahead.outdoor), len(self.model.maps)
-        low, high = np.zeros((count, m)), self._thermostats.most(ahead.outdoor, ahead.hours)
+        low, high = np.zeros((count, m)), self._thermostats.most(ahead.outdoor)
         best: StageSolution | None = None
         if self._runs and self.settings.runs == "mixed_integer":
             planned = self._mixed(ahead, (low, high))
@@ -354,7 +354,7 @@ class IdentifiedController:
         """Values of the actuators for levels."""
         planned = self._observer.state[None] if solution is None else solution.states[1:]
         zone = planned[:, : len(self.model.box.zones)] + REFERENCE
-        most, values = self._thermostats.most(ahead.outdoor[:1], ahead.hours[:1])[0], dict[str, float]()
+        most, values = self._thermostats.most(ahead.outdoor[:1])[0], dict[str, float]()
         shared = self._thermostats.shares_all(levels, ahead.outdoor[:1])
         for k, found in enumerate(self.model.maps):
             level = float(levels[k])
@@ -386,7 +386,7 @@ class IdentifiedController:
 
     def _compared(self, solution: StageSolution, ahead: Ahead, on: FloatArray) -> Callable[[], RuleEstimate]:
         """Give what holds a plan against the rule on the same model."""
-        most = self._thermostats.most(ahead.outdoor, ahead.hours)
+        most = self._thermostats.most(ahead.outdoor)
         free = np.zeros_like(most), np.ones_like(most)
         data = self._problem.data(self._observer.state, ahead, self._kept, self.settings.comfort_price, free)
         planned = solution.states, solution.decisions

@@ -6,13 +6,12 @@ import numpy as np
 
 from calibration.estimation.state_space import REFERENCE
 from mpc.control.identified.forecast_error import ForecastError
-from mpc.identify.hours import RunningHours
-from mpc.identify.limits import OUT_OF_REACH, RUNS, HeatLimit
+from mpc.identify.limits import OUT_OF_REACH, HeatLimit
 from mpc.identify.machines import as_heated, pairs_as_heated
 from mpc.identify.model import PlantModel
 from mpc.identify.shared import SharedLimit, out_of_reach
 from mpc.loop.plant import Measurements
-from thermal._types import FloatArray, IntArray
+from thermal._types import FloatArray
 
 #: A load below this is none [-], and one nearer than it to the largest is all.
 _IDLE = 0.02
@@ -46,30 +45,26 @@ class Thermostats:
         self._limits = [HeatLimit(limits, sheet) for limits, sheet in told]
         shared, sheet = (pairs_as_heated(pairs, self._sign) for pairs in (model.shared, model.sheet))
         self._shared = SharedLimit(model.led_heat, model.step, shared, sheet)
-        self._hours = RunningHours.of(model.step, model.hours, len(model.maps))
         self._is_led = np.array([found.operation == "setpoint" for found in model.maps], dtype=bool)
         self._error = ForecastError(model.step)
         self._told, self._zone = np.full(len(model.maps), np.nan), np.full(len(model.box.zones), np.nan)
         self._served = model.box.serves
 
-    def most(self, outdoor: FloatArray, hours: IntArray | None = None) -> FloatArray:
-        """Largest loads, shape (N, n_machine) [-]: 1 of machines that are commanded, 0 in hours that are not theirs.
+    def most(self, outdoor: FloatArray) -> FloatArray:
+        """Largest loads, shape (N, n_machine) [-]: 1 of machines that are commanded.
 
         Parameters
         ----------
         outdoor : ndarray, shape (N,)
             Outdoor air that is forecast for the coming steps [K].
-        hours : ndarray, shape (N,), optional
-            As of `hours_of`; all are theirs by default.
         """
         error, weather = self._error.ahead(len(outdoor)), as_heated(outdoor, self._sign)
-        loads = np.column_stack(
+        return np.column_stack(
             [
                 limit.at(weather, error) if led else np.ones(len(outdoor))
                 for limit, led in zip(self._limits, self._is_led, strict=True)
             ]
         )
-        return loads if hours is None or not hours.size else loads * self._hours.running(hours)
 
     def together(self, outdoor: FloatArray) -> FloatArray:
         """Largest load of all machines that are led by a setpoint, shape (N,): a share of their full loads [-].
@@ -96,9 +91,7 @@ class Thermostats:
         """
         self._error.made(outdoor)
 
-    def learn(
-        self, measurements: Measurements, zone: FloatArray, outdoor: float, hours: IntArray | None = None
-    ) -> None:
+    def learn(self, measurements: Measurements, zone: FloatArray, outdoor: float) -> None:
         """Take a step that has ended: how it was forecast, and what was given where a setpoint was out of reach.
 
         Parameters
@@ -109,8 +102,6 @@ class Thermostats:
             Temperatures over the step [K].
         outdoor : float
             Outdoor air over the step [K].
-        hours : ndarray, shape (1,), optional
-            The step's, as of `hours_of`.
         """
         self._error.came(outdoor)
         weather, air = as_heated(outdoor, self._sign), as_heated(zone, self._sign)
@@ -124,10 +115,8 @@ class Thermostats:
             if np.isfinite(given):
                 loads[k] = given / float(found.at(found.heat, 1.0, outdoor, REFERENCE))
                 missing[k] = self._told[k] - float(np.nanmean(end[self._served[k]]))
-        beyond = out_of_reach(missing, np.array([found.above[1] for found in self._model.maps]))
-        if hours is not None and hours.size:
-            self._hours.learn(hours, beyond[None], (loads > RUNS)[None])
-        alone = self._shared.learn(weather, loads, (loads > _IDLE) & beyond, self._limits)
+        full = np.array([found.above[1] for found in self._model.maps])
+        alone = self._shared.learn(weather, loads, (loads > _IDLE) & out_of_reach(missing, full), self._limits)
         for k in np.flatnonzero(loads > _IDLE):
             # what several at their limit give at once says nothing of one of them alone
             if (alone[k] and missing[k] > OUT_OF_REACH) or loads[k] > self._limits[k].at(np.array([weather]))[0]:

@@ -12,7 +12,6 @@ import pytest
 from calibration.estimation.state_space import REFERENCE
 from calibration.grey_box.network import GreyBox
 from mpc.baselines.plants import FullSpeed
-from mpc.control.identified.ahead import Ahead
 from mpc.control.identified.beyond import PowerLearner
 from mpc.control.identified.controller import IdentifiedController
 from mpc.control.identified.electric import Electric
@@ -20,7 +19,6 @@ from mpc.control.identified.thermostats import Thermostats
 from mpc.errors import PlantError
 from mpc.identify.curves import Curve
 from mpc.identify.excitation import Excitation, ExcitationSettings
-from mpc.identify.hours import RunningHours
 from mpc.identify.identify import identify
 from mpc.identify.machines import Machine, as_heated, find_machines, pairs_as_heated
 from mpc.identify.maps import MachineMap, OwnPower
@@ -148,11 +146,9 @@ def telemetry_of(sign: float, rows: Mapping[str, FloatArray]) -> PlantTelemetry:
     return PlantTelemetry(pd.DataFrame(frame, index=stamps), STEP, Site("room", {"south": 40.0}, PLACE))
 
 
-def room_of(off: int) -> dict[str, FloatArray]:
-    """Air and walls of a room under a proportional thermostat of 3 kW that is asked for much on cold mornings.
-
-    Its heater stands still until `off` o'clock.
-    """
+@pytest.fixture(scope="module")
+def recorded() -> dict[str, FloatArray]:
+    """Air and walls of a room under a proportional thermostat of 3 kW that is asked for much on cold mornings."""
     rng, count = np.random.default_rng(1), 5 * 96
     hours = np.arange(count) / 4.0
     outdoor = 272.0 + 4.0 * np.sin(2.0 * np.pi * (hours - 9.0) / 24.0) + np.cumsum(rng.normal(0.0, 0.1, count))
@@ -161,19 +157,13 @@ def room_of(off: int) -> dict[str, FloatArray]:
     for k in range(count):
         parts = []
         for _ in range(15):
-            given = 3000.0 * np.clip((setpoint[k] - air) / 0.6, 0.0, 1.0) * (hours[k] % 24.0 >= off)
+            given = 3000.0 * np.clip((setpoint[k] - air) / 0.6, 0.0, 1.0)
             air += 60.0 / 6e5 * (given + 200.0 * (wall - air) + 30.0 * (outdoor[k] - air))
             wall += 60.0 / 8e6 * (200.0 * (air - wall) + 40.0 * (outdoor[k] - wall))
             parts.append((air, given))
         zone[k], heat[k] = np.mean(parts, axis=0)
     zone += rng.normal(0.0, 0.02, count)
     return {"outdoor": outdoor, "setpoint": setpoint, "zone": zone, "heat": heat, "bought": 150.0 + heat / 3.0}
-
-
-@pytest.fixture(scope="module")
-def recorded() -> dict[str, FloatArray]:
-    """The room, whose heater never stands still."""
-    return room_of(0)
 
 
 def test_what_is_identified_of_cooling_is_that_of_heating_in_the_mirror(recorded: dict[str, FloatArray]) -> None:
@@ -234,19 +224,6 @@ def test_a_data_sheet_of_a_source_is_a_share_of_all_full_loads(recorded: dict[st
     assert told[1] == pytest.approx(0.95 * 2000.0 / whole, rel=0.1) and told[0] < 0.5
     with pytest.raises(PlantError, match="source: expected setpoints of all zones"):
         identify(replace(telemetry, site=replace(site, areas={"south": 40.0})), machines[:1])
-
-
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_hours_in_which_a_machine_stands_still_are_found_and_nothing_is_planned_in_them(sign: float) -> None:
-    found = identify(telemetry_of(sign, room_of(6)), [machine_of("south", sign)])
-    closed = RunningHours.of(STEP, found.model.hours, 1).closed[0]
-    assert set(np.flatnonzero(closed)) <= set(range(6)) and closed[:6].sum() >= 4
-    assert any("in vain: none is planned then" in note for note in found.notes)
-    model = PlantModel.from_dict(found.model.to_dict())
-    table = forecast_of(sign, np.full(96, 270.0), "2023-01-09 00:15")
-    ahead = Ahead.of(model, Forecast(table[[c for c in table if not c.startswith("north")]]), PLACE)
-    most = Thermostats(model).most(ahead.outdoor, ahead.hours)[:, 0]
-    assert ((most == 0.0) == np.repeat(closed[:24], 4)).all()
 
 
 def test_setpoints_of_cooling_are_chosen_when_they_are_asked_for() -> None:
