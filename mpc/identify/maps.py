@@ -133,7 +133,7 @@ class MachineMap:
         return float(as_heated(OUTDOOR, sign)), EMITTER if sign > 0.0 else REFERENCE
 
     def efficiency(self, u: float, outdoor: float | None = None, emitter: float | None = None) -> float:
-        """Heat over what is bought [-].
+        """Heat over what is bought [-]; NaN of a machine that buys nothing that is metered.
 
         Parameters
         ----------
@@ -144,7 +144,7 @@ class MachineMap:
         """
         outdoor, emitter = outdoor or self.rating[0], emitter or self.rating[1]
         bought = sum(curve(1.0, u, outdoor, emitter) for curve in self.powers.values())
-        return float(self.heat(1.0, u, outdoor, emitter) / max(bought, 1e-6))
+        return float(self.heat(1.0, u, outdoor, emitter) / bought) if bought > 0.0 else np.nan
 
 
 def led_heat(maps: Sequence[MachineMap]) -> FloatArray:

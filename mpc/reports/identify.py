@@ -112,7 +112,7 @@ def identify_summary(found: Identified, made: Experiment | None) -> dict[str, An
         "machines": {
             m.machine.name: {
                 "operation": m.operation, "standing_power": m.standing,
-                "efficiency": None if found.model.source is not None else
+                "efficiency": None if found.model.source is not None or np.isnan(m.efficiency(1.0)) else
                 {"full": m.efficiency(1.0), "half": m.efficiency(0.5)},
                 "terms": [_told(row) for row in _terms(m)],
             }

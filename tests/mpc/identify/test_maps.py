@@ -8,7 +8,7 @@ import pytest
 from mpc.errors import PlantError
 from mpc.identify.curves import Curve, interval_of
 from mpc.identify.machines import Machine, find_machines
-from mpc.identify.maps import map_machines
+from mpc.identify.maps import MachineMap, map_machines
 from mpc.identify.regression import Loads, regress, regress_power
 from mpc.loop.actuators import Actuator
 
@@ -134,3 +134,5 @@ def test_a_machine_that_buys_nothing_leaves_the_others_their_weather() -> None:
         told = [float(curves[0](1.0, 1.0, *at)) for at in ((270.0, 300.0), (280.0, 300.0), (280.0, 305.0))]
         assert np.diff(told) == pytest.approx([-400.0, 250.0], abs=50.0)
         assert abs(float(curves[1].without_standing()(1.0, 1.0, 275.0, 300.0))) < 60.0
+    none = MachineMap(SPEED, "setpoint", Curve({"command": 2000.0}, {}), {"electricity": Curve({}, {})})
+    assert np.isnan(none.efficiency(1.0))  # of what buys nothing nothing is told
