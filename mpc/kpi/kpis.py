@@ -331,8 +331,6 @@ def measure_kpis(
     *,
     first_step: int = 0,
     co2_limit: float | None = None,
-    district_price: float | None = None,
-    district_carbon: float | None = None,
     control_step: float | None = None,
 ) -> Kpis:
     """Measure a run on the plant's own steps.

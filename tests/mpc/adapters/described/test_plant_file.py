@@ -14,14 +14,12 @@ import pytest
 import yaml
 
 from mpc.adapters.boptest.scenario import YearClock
-from mpc.adapters.described.actuators import described_actuators
 from mpc.adapters.described.load import _mappings, _span, load_plant
 from mpc.adapters.described.read import READY, ready_plants
 from mpc.adapters.described.schema import Period, PlantFile
 from mpc.adapters.described.series import NamedSeries, read_table, unit_period
 from mpc.adapters.fmu.plant import FmuSignals
 from mpc.errors import MpcError, PlantActionError, PlantError
-from mpc.identify.machines import find_machines
 from mpc.identify.telemetry import PlantTelemetry
 from mpc.kpi.kpis import measure_kpis
 from mpc.loop.plant import Measurements
@@ -33,7 +31,6 @@ from mpc.studies.electric import electric_of
 
 pytest.importorskip("fmpy", reason="needs the extra [fmu]")
 GUIDE = Path(__file__).parents[4] / "docs" / "plant.md"
-OFFICE = ("core", "east", "north", "south", "west")
 SPEED, SETPOINT = "heat_pump/compressor_speed", "house/zone_air_heating_temperature_setpoint"
 Make = Callable[..., Path]
 
@@ -191,28 +188,6 @@ def test_ready_descriptions_fit_the_schema() -> None:
         FmuSignals(**_mappings(described))  # refuses points that the case format lacks
         assert all(entry.signal.endswith("_u") for entry in described.actuators.values())
         assert all(signal.endswith("_y") for signals in described.energy.model_dump().values() for signal in signals)
-
-
-@pytest.mark.parametrize("name, chosen, meters, cooling", [
-    ("bestest_air", ["office/zone_air_heating_temperature_setpoint"], [""], True),
-    ("bestest_hydronic", ["house/zone_air_heating_temperature_setpoint"], ["boiler/heating_power_sensor"], True),
-    ("bestest_hydronic_heat_pump", ["heat_pump/compressor_speed"], ["heat_pump/heating_power_sensor"], False),
-    ("twozone_apartment_hydronic", [f"{zone}/zone_air_heating_temperature_setpoint" for zone in ("day", "night")],
-     ["day/heating_power_sensor", "night/heating_power_sensor"], False),
-    ("multizone_residential_hydronic", ["boiler/part_load_ratio"], [""], True),
-    ("multizone_office_simple_air", [f"{zone}/zone_air_heating_temperature_setpoint" for zone in OFFICE],
-     [f"{zone}/supply_air_flowrate_sensor" for zone in OFFICE], True),
-    ("singlezone_commercial_hydronic", ["building/zone_air_heating_temperature_setpoint"],
-     ["district/heating_power_sensor"], False),
-])  # fmt: skip
-def test_what_is_identified_of_ready_plants(name: str, chosen: list[str], meters: list[str], cooling: bool) -> None:
-    file = PlantFile.model_validate(yaml.safe_load((READY / f"{name}.yaml").read_text(encoding="utf-8")))
-    there = described_actuators(file, {a: (0.0, 400.0 if a.endswith("setpoint") else 1.0) for a in file.actuators})
-    found = find_machines(there, [*file.measurements], [*file.zones])
-    assert [m.name for m in found] == chosen and [m.meter for m in found] == meters
-    if cooling:
-        cools = find_machines(there, [*file.measurements], [*file.zones], cooling=True)
-        assert all(m.sign == -1.0 and len(m.serves) == 1 for m in cools) and len(cools) >= len(file.zones)
 
 
 def test_a_source_of_the_guide_needs_terminals_of_several_zones(folder: Path) -> None:
