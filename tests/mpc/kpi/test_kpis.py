@@ -13,6 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from mpc.errors import MpcError
+from mpc.kpi.bought import costs_of, fuel_of
 from mpc.kpi.kpis import KPIS, Kpis, MeasuredRun, measure_kpis, register_kpi
 from mpc.kpi.record import PlantRecord
 from mpc.scenario.scenario import Scenario
@@ -211,3 +212,14 @@ def test_a_record_goes_to_pandas_and_back(plain_scenario: Make) -> None:
     assert repr(run) == "PlantRecord(4 steps of 900 s, 2 zones)"
     with pytest.raises(MpcError, match="regular edges"):
         PlantRecord.from_frame(table.drop(columns="electricity"))
+
+
+def test_gas_and_district_heating_cost_what_each_costs(plain_scenario: Make) -> None:
+    scenario = replace(plain_scenario(n_steps=48), district_price=np.full(48, 0.08), gas_price=np.full(48, 0.05),
+                       district_carbon=np.zeros(48))  # fmt: skip
+    run = record(scenario, 3, district_heating=np.full(48, 700.0))
+    run = replace(run, gas=np.where(np.arange(48) < 24, 300.0, 0.0))
+    fuel, costs = fuel_of(run, scenario), costs_of(run, scenario)
+    assert fuel.name == "gas and district heating" and fuel.power[[0, 47]].tolist() == [1000.0, 700.0]
+    assert fuel.price[[0, 47]] == pytest.approx([(0.3 * 0.05 + 0.7 * 0.08) / 1.0, 0.08])
+    assert (costs[0].sum() + costs[1].sum()) == pytest.approx(measure_kpis(run, scenario).cost_tot * scenario.floor_area)
