@@ -21,6 +21,7 @@ _ZONES = {
     "north": ("Perimeter_bot_ZN_3", 207.34), "west": ("Perimeter_bot_ZN_4", 131.26),
 }  # fmt: skip
 _HEIGHT, _AREA_EACH = 2.74, 18.58  # m, and m2 for a person
+_GAS = 0.05  # EUR/kWh
 _WORK, _NOBODY = [6 <= hour < 22 for hour in range(24)], [False] * 24
 
 
@@ -51,4 +52,4 @@ def description() -> dict[str, Any]:
         }  # fmt: skip
         electricity.append(f"{zone} VAV Box Reheat Coil, Heating Coil Electricity Rate")
     gas = ["VAV_1_HeatC, Heating Coil NaturalGas Rate"]
-    return told | {"energy": {"electricity": electricity, "gas": gas}, "prices": {"gas": 0.05}}
+    return told | {"energy": {"electricity": electricity, "gas": gas}, "prices": {"gas": _GAS}}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -23,17 +24,10 @@ SAME = 0.05
 #: Parts of the days of which each is left out once.
 _FOLDS = 5
 
-#: What is left out of a machine's features, one set after the other, until more load does not seem to cost less; after
-#: the last it has no part in what is bought.
-_LEFT_OUT: tuple[tuple[str, ...], ...] = (
-    (),
-    ("emitter",),
-    ("emitter", "command^2 outdoor"),
-    ("emitter", "command^2 outdoor", "command^2"),
-    ("emitter", "command^2 outdoor", "command^2", "outdoor"),
-    ("emitter", "command^2 outdoor", "command^2", "outdoor", "standing"),
-)
-_NO_PART = len(_LEFT_OUT)
+#: What is left out of a machine's features, one after the other, until more load does not seem to cost less; after the
+#: last it has no part in what is bought.
+_ORDER = ("emitter", "command^2 outdoor", "command^2", "outdoor", "standing")
+_NO_PART = len(_ORDER) + 1
 
 #: Squared error on left-out days over that of a larger set of features, from which on a smaller one is taken [-].
 BETTER = 0.9
@@ -92,19 +86,28 @@ class Loads:
 
 
 def _design(
-    loads: Loads, known: BoolArray, machines: Sequence[int], base: bool,
-    left_out: Mapping[int, Sequence[str]] | None = None,
+    loads: Loads, rows: BoolArray, left_out: Mapping[int, int], base: bool
 ) -> tuple[FloatArray, list[tuple[int, str]]]:
-    """Columns of a regression, by machine and feature; a constant first, where something may be left."""
-    columns, owners = ([np.ones(int(known.sum()))], [(-1, "constant")]) if base else ([], [])
-    for m in machines:
-        for name, feature in loads.features(m).items():
-            column = feature[known[loads.known]]
-            told = name not in (left_out or {}).get(m, ())
-            if told and (name != "standing" or not (base and column.all())):
+    """Columns of a regression on some rows, by machine and feature; a constant first, where something may be left.
+
+    `left_out` says of each machine how many of `_ORDER` are left out.
+    """
+    columns, owners = ([np.ones(int(rows.sum()))], [(-1, "constant")]) if base else ([], [])
+    for m, count in left_out.items():
+        told = loads.features(m) if count < _NO_PART else {}
+        for name in (name for name in told if name not in _ORDER[:count]):
+            column = told[name][rows[loads.known]]
+            if name != "standing" or not (base and column.all()):
                 columns.append(column)
                 owners.append((m, name))
     return np.column_stack(columns), owners
+
+
+def _on_all_steps(design: FloatArray, rows: BoolArray) -> FloatArray:
+    """Columns on some rows as columns on all steps, NaN on the others, shape (n_time, n_column)."""
+    whole = np.full((len(rows), design.shape[1]), np.nan)
+    whole[rows] = design
+    return whole
 
 
 def design_of(loads: Loads, machines: Sequence[int]) -> FloatArray:
@@ -117,10 +120,8 @@ def design_of(loads: Loads, machines: Sequence[int]) -> FloatArray:
     machines : sequence of int
         Which machines have a part in it.
     """
-    columns, _ = _design(loads, loads.known, machines, True)
-    design = np.full((len(loads.level), columns.shape[1]), np.nan)
-    design[loads.known] = columns
-    return design
+    design, _ = _design(loads, loads.known, dict.fromkeys(machines, 0), True)
+    return _on_all_steps(design, loads.known)
 
 
 def left_out_error(design: FloatArray, values: FloatArray, per_day: int) -> float:
@@ -173,11 +174,19 @@ def regress(
     PlantError
         When there are too few steps with known loads.
     """
+    curves, constant, _ = _fitted(loads, values, dict.fromkeys(machines, 0), base)
+    return list(curves.values()), constant
+
+
+def _fitted(
+    loads: Loads, values: FloatArray, left_out: Mapping[int, int], base: bool
+) -> tuple[dict[int, Curve], float, FloatArray]:
+    """Regress with so much left out of each machine: curves by machine, the constant [W], columns on all steps."""
     rows = loads.known & np.isfinite(values)
-    design, owners = _design(loads, rows, machines, base)
+    design, owners = _design(loads, rows, left_out, base)
     found, deviations = least_squares(design, values[rows])
-    curves = [curve_of([name if owner == m else "" for owner, name in owners], found, deviations) for m in machines]
-    return curves, float(found[0]) if base else 0.0
+    curves = {m: curve_of([name if owner == m else "" for owner, name in owners], found, deviations) for m in left_out}
+    return curves, float(found[0]) if base else 0.0, _on_all_steps(design, rows)
 
 
 def regress_power(
@@ -228,36 +237,26 @@ def regress_power(
 
 
 def _rising(loads: Loads, values: FloatArray, left_out: dict[int, int]) -> tuple[list[Curve], float, FloatArray]:
-    """Regress with so many sets of features left out of each machine, or more where power would fall with its load.
+    """Regress as `_fitted`, with more left out of machines whose power would fall with their load.
 
-    Returns curves, the constant [W] and the columns, shape (n_time, n_column); `left_out` becomes what was left out.
+    `left_out` becomes what was left out.
     """
-    rows = loads.known & np.isfinite(values)
     while True:
-        part = [m for m, count in left_out.items() if count < _NO_PART]
-        design, owners = _design(loads, rows, part, True, {m: _LEFT_OUT[left_out[m]] for m in part})
-        found, deviations = least_squares(design, values[rows])
-        curves = {m: curve_of([name if owner == m else "" for owner, name in owners], found, deviations)
-                  for m in left_out}  # fmt: skip
-        falling = [m for m in part if not _rises(curves[m], loads, m)]
+        curves, constant, design = _fitted(loads, values, left_out, True)
+        falling = [m for m, curve in curves.items() if not _rises(curve, loads, m)]
         if not falling:
-            whole = np.full((len(rows), design.shape[1]), np.nan)
-            whole[rows] = design
-            return list(curves.values()), float(found[0]), whole
+            return list(curves.values()), constant, design
         for m in falling:
             left_out[m] += 1
 
 
 def _rises(curve: Curve, loads: Loads, m: int) -> bool:
     """Tell whether power rises with a machine's load, in the weather and at the temperatures that were seen."""
-    known, part = loads.known, curve.without_standing()
-    seen = [np.quantile(values[known], _ENDS) for values in (loads.outdoor, loads.emitter[:, m])]
-    for outdoor in seen[0]:
-        for emitter in seen[1]:
-            powers = [float(part(1.0, u, outdoor, emitter)) for u in _LOADS]
-            if min(np.diff(powers)) < 0.0:
-                return False
-    return True
+    part, seen = curve.without_standing(), (loads.outdoor[loads.known], loads.emitter[loads.known, m])
+    return all(
+        min(np.diff([float(part(1.0, u, *at)) for u in _LOADS])) >= 0.0
+        for at in product(*(np.quantile(values, _ENDS) for values in seen))
+    )
 
 
 def least_squares(design: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -178,17 +178,20 @@ def _air(run: MeasuredRun) -> float | None:
 
 
 def _cost(run: MeasuredRun) -> float:
-    scenario, rows = run.scenario, run.rows
-    district = None if scenario.district_price is None else scenario.district_price[rows]
-    return run.energy(scenario.electricity_price[rows], scenario.gas_price[rows], district)
+    scenario = run.scenario
+    return _weighed(run, scenario.electricity_price, scenario.gas_price, scenario.district_price)
 
 
 def _emissions(run: MeasuredRun) -> float | None:
-    scenario, rows = run.scenario, run.rows
-    if not scenario.carbon_kind:
-        return None
-    district = None if scenario.district_carbon is None else scenario.district_carbon[rows]
-    return run.energy(scenario.electricity_carbon[rows], scenario.gas_carbon[rows], district)
+    scenario = run.scenario
+    carbons = scenario.electricity_carbon, scenario.gas_carbon, scenario.district_carbon
+    return _weighed(run, *carbons) if scenario.carbon_kind else None
+
+
+def _weighed(run: MeasuredRun, electricity: FloatArray, gas: FloatArray, district: FloatArray | None) -> float:
+    """Energy of a run by factors on the steps of its scenario, see `MeasuredRun.energy`."""
+    rows = run.rows
+    return run.energy(electricity[rows], gas[rows], None if district is None else district[rows])
 
 
 def _time_ratio(run: MeasuredRun) -> float | None:

@@ -89,14 +89,9 @@ class PlantStudy:
     def site(self) -> Site:
         """Zones and place."""
         file = self.description
-        areas = {name: zone.floor_area for name, zone in file.zones.items()}
-        return Site(file.name, areas, file.location, self._sheet)
-
-    @property
-    def _sheet(self) -> tuple[tuple[float, float], ...]:
-        """Data sheet of one source for all that is identified."""
-        source = self.description.source
-        return () if source is None else source.cooling if self.cooling else source.heating
+        areas, source = {name: zone.floor_area for name, zone in file.zones.items()}, file.source
+        sheet = () if source is None else source.cooling if self.cooling else source.heating
+        return Site(file.name, areas, file.location, sheet)
 
     def plant(self) -> Any:
         """Make the plant, to be reset, and freed by leaving a ``with`` block."""
@@ -161,7 +156,7 @@ class PlantStudy:
         of_machines = [a for a in actuators if electric is None or a.name != electric.command]
         sheets = {name: told[name].capacity for name in told}
         found = find_machines(of_machines, columns, zones, self.actuators, sheets, cooling=self.cooling)
-        if self._sheet:
+        if self.site.capacity:
             check_terminals(found, self.description.zones)
         return found
 

@@ -254,4 +254,3 @@ def _outside_so_far(run: ControlRun) -> FloatArray:
     zone = run.loop.record.zone_temperature[1 : n + 1]
     outside = np.maximum(np.maximum(scenario.lower[:n] - zone, zone - scenario.upper[:n]), 0.0)
     return np.asarray(np.cumsum(outside.mean(axis=1)) * run.loop.record.step / 3600.0)
-
