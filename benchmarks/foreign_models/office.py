@@ -197,6 +197,6 @@ def description(of: Office | None = None) -> dict[str, Any]:
         "heat_pump/heating_power_sensor": f"{PUMP}, Heat Pump Load Side Heat Transfer Rate",
     }
     told["actuators"] |= acted
-    source = {"heating": of.machine.sheet(_HOT_WATER)}
+    source = {"heating": of.machine.sheet(_HOT_WATER), "heating_water": "heat_pump/supply_water_temperature_setpoint"}
     source |= {} if of.chiller is None else {"cooling": of.chiller.sheet(_COLD_WATER)}
     return told | {"source": source, "energy": {"electricity": electricity}}

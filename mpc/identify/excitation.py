@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mpc.identify.machines import Machine, as_heated
+from mpc.loop.actuators import Actuator
 from mpc.loop.plant import Measurements
 from mpc.scenario.forecast import Forecast
 from thermal.case.points import ZONE_TEMPERATURE
@@ -35,6 +36,11 @@ class ExcitationSettings:
         Share of the levels of a machine that lie between off and full load [-].
     seed : int
         Of the random levels.
+    water_hold : tuple of float
+        Shortest and longest time that the temperature of supply water is held [s]: what terminals give with it shows
+        within an hour.
+    own_water : float
+        Share of these times in which the plant itself has the water [-].
     """
 
     hold: tuple[float, float] = (1800.0, 10_800.0)
@@ -43,6 +49,8 @@ class ExcitationSettings:
     back: float = 3600.0
     part_load: float = 0.35
     seed: int = 0
+    water_hold: tuple[float, float] = (3600.0, 14_400.0)
+    own_water: float = 0.3
 
 
 class _Place(NamedTuple):
@@ -66,7 +74,7 @@ class Excitation:
     are to be told from it too: off, full load and, where the actuator takes them, loads in between; setpoints anywhere
     within the band of their zone, clear of the zone's other setpoint (`Machine.farthest`). Once a zone of a machine is
     nearer to an edge of its band than the guard, on the side that the machine drives it to, the plant's own control has
-    the machine.
+    the machine. Supply water has random temperatures, until a zone is near the edge that the water keeps it from.
 
     Parameters
     ----------
@@ -76,10 +84,16 @@ class Excitation:
         Control step [s].
     settings : ExcitationSettings, optional
         Choices.
+    water : Actuator, optional
+        Setpoint of the water that a source supplies to the machines.
     """
 
-    def __init__(self, machines: Sequence[Machine], step: float, settings: ExcitationSettings | None = None) -> None:
+    def __init__(
+        self, machines: Sequence[Machine], step: float, settings: ExcitationSettings | None = None,
+        water: Actuator | None = None,
+    ) -> None:  # fmt: skip
         self.machines, self.step_seconds, self.settings = machines, step, settings or ExcitationSettings()
+        self._water = None if water is None else _Water(water, step, self.settings)
         self._random = np.random.default_rng(self.settings.seed)
         self._value = dict.fromkeys((m.name for m in machines), np.nan)
         self._until = dict.fromkeys((m.name for m in machines), -1)
@@ -116,7 +130,22 @@ class Excitation:
                 chosen |= machine.told(value, place.other)
             else:
                 chosen[machine.name] = value
+        if self._water is not None:
+            near = min(self._near(machine, measurements, forecast) for machine in self.machines)
+            chosen |= self._water.step(k, near)
         return chosen
+
+    def _near(self, machine: Machine, measurements: Measurements, forecast: Forecast | None) -> float:
+        """Least distance of the served zones from the edge that the machine keeps them from, now and in a step [K]."""
+        found, side = [], "lower" if machine.sign > 0.0 else "upper"
+        for zone in machine.serves:
+            name = f"{zone}/{ZONE_TEMPERATURE}"
+            if forecast is None or name not in measurements or not np.isfinite(measurements[name]):
+                return -np.inf
+            edges = forecast.table[f"{zone}/comfort_{side}_temperature"].iloc[:2]
+            kept = edges.max() if machine.sign > 0.0 else edges.min()
+            found.append(machine.sign * float(measurements[name] - kept))
+        return min(found)
 
     def _place(self, machine: Machine, measurements: Measurements, forecast: Forecast | None) -> _Place | None:
         """Find where the served zones are in their bands; None while nothing tells."""
@@ -168,3 +197,25 @@ class Excitation:
             self._value[machine.name] = float(random.uniform(least, high))
         else:
             self._value[machine.name] = high
+
+
+class _Water:
+    """Random temperatures of supply water, and the plant's own while a zone is near an edge."""
+
+    def __init__(self, actuator: Actuator, step: float, settings: ExcitationSettings) -> None:
+        self._actuator, self._step, self._settings = actuator, step, settings
+        self._random = np.random.default_rng([settings.seed, 1])
+        self._until, self._value = -1, np.nan
+
+    def step(self, k: int, near: float) -> dict[str, float]:
+        """Choose a temperature, or nothing while the plant has the water."""
+        told = self._settings
+        if near < told.guard[0]:
+            self._until, self._value = k + round(told.back / self._step), np.nan
+        elif k >= self._until:
+            shortest, longest = (max(round(s / self._step), 1) for s in told.water_hold)
+            self._until = k + int(self._random.integers(shortest, longest + 1))
+            own = self._random.random() < told.own_water
+            drawn = self._random.uniform(self._actuator.lowest, self._actuator.highest)
+            self._value = np.nan if own else float(drawn)
+        return {} if np.isnan(self._value) else {self._actuator.name: self._value}

@@ -19,6 +19,7 @@ from mpc.identify.regression import Loads
 from mpc.identify.shared import out_of_reach, shared_of
 from mpc.identify.source import find_source
 from mpc.identify.telemetry import CARRIERS, SET, PlantTelemetry
+from mpc.identify.water import find_water, told_water
 from thermal._types import FloatArray
 from thermal.case.points import ZONE_TEMPERATURE
 
@@ -99,7 +100,13 @@ def identify(telemetry: PlantTelemetry, machines: Sequence[Machine], progress: P
     own = [telemetry.column(m.power) if m.power and m.meter else None for m in machines]
     above = _above(telemetry, machines)
     per_day = round(86_400.0 / telemetry.step)
-    maps, base = map_machines(machines, loads, signals, bought, above, per_day, own)
+    water, reached = find_water(telemetry, machines, loads, bought), None
+    if water is not None:
+        measured = telemetry.column(water.sensor)
+        reached = water.reached(loads.level, measured[:, None], _air(telemetry, machines))
+        part = water.bought(np.nan_to_num(loads.level), measured).sum(axis=1) + water.stored(measured)
+        bought = {kind: values - part[:, CARRIERS.index(kind)] for kind, values in bought.items()}
+    maps, base = map_machines(machines, loads, signals, bought, above, per_day, own, reached)
     source, left = find_source(loads, bought, maps, per_day)
     if source is not None:
         rest = [{kind: curve for kind, curve in m.powers.items() if kind not in source.powers} for m in maps]
@@ -107,6 +114,8 @@ def identify(telemetry: PlantTelemetry, machines: Sequence[Machine], progress: P
     sign, law = machines[0].sign, np.array([found.above[1] for found in maps])
     alone, wanted = [pairs_as_heated(found.limits, sign) for found in maps], out_of_reach(above, law)
     outdoor = as_heated(loads.outdoor, sign)
+    if water is not None:  # cold water is no limit of its source
+        wanted &= water.missed(told_water(telemetry, water.actuator.name), telemetry.column(water.sensor))[:, None]
     whole = float(np.maximum(led_heat(maps), 0.0).sum())
     sheet = tuple((at, heat / whole) for at, heat in telemetry.site.capacity)
     held_back = shared_of(
@@ -114,7 +123,7 @@ def identify(telemetry: PlantTelemetry, machines: Sequence[Machine], progress: P
     )
     notes = _notes(telemetry, machines, suns)
     shared = pairs_as_heated(held_back, sign)
-    model = PlantModel(telemetry.site.name, telemetry.step, box, maps, base | left, shared, source, sheet)
+    model = PlantModel(telemetry.site.name, telemetry.step, box, maps, base | left, shared, source, sheet, water)
     return Identified(model, telemetry, data, loads, tuple(errors), split, notes)
 
 
@@ -146,6 +155,11 @@ def _loads(telemetry: PlantTelemetry, machines: Sequence[Machine], data: GreyBox
     if machines[0].sign < 0.0:  # what cools blows air: of its water a floor tells nothing
         emitter[:] = EMITTER
     return Loads(level, data.outdoor, emitter)
+
+
+def _air(telemetry: PlantTelemetry, machines: Sequence[Machine]) -> FloatArray:
+    """Air of the machines' zones, shape (n_time, n_machine) [K]."""
+    return np.column_stack([telemetry.column(f"{machine.serves[0]}/{ZONE_TEMPERATURE}") for machine in machines])
 
 
 def _above(telemetry: PlantTelemetry, machines: Sequence[Machine]) -> FloatArray:

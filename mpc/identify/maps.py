@@ -160,7 +160,7 @@ def led_heat(maps: Sequence[MachineMap]) -> FloatArray:
 
 def map_machines(
     machines: Sequence[Machine], loads: Loads, signals: FloatArray, bought: Mapping[str, FloatArray],
-    above: FloatArray, per_day: int, own: Sequence[FloatArray | None] = (),
+    above: FloatArray, per_day: int, own: Sequence[FloatArray | None] = (), reached: FloatArray | None = None,
 ) -> tuple[tuple[MachineMap, ...], dict[str, float]]:
     """Make the map of each machine.
 
@@ -180,6 +180,8 @@ def map_machines(
         Steps of a day.
     own : sequence of ndarray or None
         What each machine's own sensor of power says, shape (n_time,) [W]; None of those without.
+    reached : ndarray, shape (n_time, n_machine), optional
+        What the hottest water would have given, see `SupplyWater.reached` [-]; the loads by default.
 
     Returns
     -------
@@ -200,7 +202,8 @@ def map_machines(
             made.append(replace(found, operation=_operation(found)))
         else:
             level, over = loads.level[:, m], above[:, m]
-            limits = limits_of(as_heated(loads.outdoor, machine.sign), level, over)
+            gave = level if reached is None else reached[:, m]
+            limits = limits_of(as_heated(loads.outdoor, machine.sign), gave, over)
             made.append(replace(found, above=_local(level, over), limits=pairs_as_heated(limits, machine.sign)))
     made = [
         found if power is None else _with_own(found, m, loads, power)

@@ -20,11 +20,12 @@ from mpc.identify.maps import MachineMap, OwnPower, led_heat
 from mpc.identify.shared import shares_of
 from mpc.identify.source import Source
 from mpc.identify.telemetry import CARRIERS
+from mpc.identify.water import SupplyWater
 from mpc.loop.actuators import Actuator
 from thermal._types import FloatArray
 
 #: File of a model in its folder, and the version of its contents.
-FILE, FORMAT = "model.json", 7
+FILE, FORMAT = "model.json", 8
 
 #: A load that is none [-].
 _NOTHING = 1e-9
@@ -54,6 +55,8 @@ class PlantModel:
     sheet : tuple of tuple of float
         Of one source for all of them, by its data sheet: outdoor air [K], rising, and their largest load together as
         such a share [-].
+    water : SupplyWater or None
+        Of that source, where its temperature is decided; largest loads are then those with the hottest.
     """
 
     name: str
@@ -64,6 +67,7 @@ class PlantModel:
     shared: tuple[tuple[float, float], ...] = ()
     source: Source | None = None
     sheet: tuple[tuple[float, float], ...] = ()
+    water: SupplyWater | None = None
 
     @property
     def sign(self) -> float:
@@ -79,7 +83,9 @@ class PlantModel:
             Of the plant, those of the model among them.
         """
         by_name = {a.name: a for a in actuators}
-        return replace(self, maps=tuple(replace(m, machine=m.machine.bound(by_name)) for m in self.maps))
+        water = None if self.water is None else replace(self.water, actuator=by_name[self.water.actuator.name])
+        maps = tuple(replace(m, machine=m.machine.bound(by_name)) for m in self.maps)
+        return replace(self, maps=maps, water=water)
 
     @property
     def led_heat(self) -> FloatArray:
@@ -90,6 +96,16 @@ class PlantModel:
     def shares(self) -> FloatArray:
         """Of each machine in the load of all that setpoints lead, shape (n_machine,) [-]; see `shares_of`."""
         return shares_of(self.led_heat)
+
+    def air(self, zone: FloatArray) -> FloatArray:
+        """Air that each machine heats, or cools, shape (n_machine,) [K].
+
+        Parameters
+        ----------
+        zone : ndarray, shape (n_zone,)
+            Of the zones [K].
+        """
+        return np.array([zone[served].mean() for served in self.box.serves])
 
     def heat(self, states: FloatArray, levels: FloatArray, outdoor: FloatArray | float) -> FloatArray:
         """Heat of each machine, or what stands for it where it is not measured, shape (..., n_machine) [W].
@@ -111,7 +127,9 @@ class PlantModel:
             heat[..., k] = self.sign * found.at(found.heat, levels[..., k], outdoor, emitter[..., k])
         return heat
 
-    def bought(self, states: FloatArray, levels: FloatArray, outdoor: FloatArray | float) -> FloatArray:
+    def bought(
+        self, states: FloatArray, levels: FloatArray, outdoor: FloatArray | float, water: FloatArray | float | None = None
+    ) -> FloatArray:
         """Power that each machine buys, shape (..., n_machine, n_carrier) [W]; `base` is not among it.
 
         What a source buys is shared out by load.
@@ -120,6 +138,8 @@ class PlantModel:
         ----------
         states, levels, outdoor : ndarray
             As of `heat` [K less the reference], [-] and [K].
+        water : ndarray, shape (...), or float, optional
+            Supply water where it is decided; that of the plant itself by default [K].
         """
         emitter = self.box.emitter(states)
         powers = np.zeros((*emitter.shape, len(CARRIERS)))
@@ -131,6 +151,9 @@ class PlantModel:
             total = loads.sum(axis=-1)
             by_load = self.source.at(total, outdoor) / np.maximum(total, _NOTHING)[..., None]
             powers += loads[..., None] * by_load[..., None, :]
+        if self.water is not None:
+            supply = self.water.of_plant(outdoor) if water is None else water
+            powers += self.water.bought(levels[..., : len(self.maps)], supply)
         return powers
 
     @property
@@ -154,6 +177,7 @@ class PlantModel:
             "format": FORMAT, "name": self.name, "step": self.step, "grey_box": self.box.to_dict(), "machines": maps,
             "base": dict(self.base), "source": None if self.source is None else asdict(self.source),
             "shared": [list(pair) for pair in self.shared], "sheet": [list(pair) for pair in self.sheet],
+            "water": None if self.water is None else asdict(self.water),
         }  # fmt: skip
 
     @classmethod
@@ -176,8 +200,8 @@ class PlantModel:
             maps = tuple(_map_of(entry) for entry in content["machines"])
             box = GreyBox.from_dict(content["grey_box"])
             shared, sheet = (tuple((float(t), float(load)) for t, load in content[key]) for key in ("shared", "sheet"))
-            base, source = dict(content["base"]), _source_of(content["source"])
-            return cls(str(content["name"]), float(content["step"]), box, maps, base, shared, source, sheet)
+            base, source, water = dict(content["base"]), _source_of(content["source"]), _water_of(content["water"])
+            return cls(str(content["name"]), float(content["step"]), box, maps, base, shared, source, sheet, water)
         except (KeyError, TypeError, ValueError, MpcError, CalibrationError) as error:
             raise ControlError(where, expected, f"{type(error).__name__}: {error}") from error
 
@@ -206,6 +230,15 @@ def _source_of(entry: Mapping[str, Any] | None) -> Source | None:
         return None
     curves = {kind: Curve(**curve) for kind, curve in entry["powers"].items()}
     return Source(curves, float(entry["full"]), float(entry["least"]), float(entry["outdoor"]))
+
+
+def _water_of(entry: Mapping[str, Any] | None) -> SupplyWater | None:
+    if entry is None:
+        return None
+    curves = {kind: Curve(**curve) for kind, curve in entry["powers"].items()}
+    shares, (level, slope) = tuple(float(share) for share in entry["shares"]), entry["own"]
+    of = Actuator(**entry["actuator"]), float(entry["sign"]), shares, curves, float(entry["temperature"])
+    return SupplyWater(*of, (float(level), float(slope)))
 
 
 def read_model(folder: Path) -> PlantModel:

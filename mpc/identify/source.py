@@ -21,7 +21,7 @@ _HALF = 0.5
 
 #: Loads below which a source may go on and off [-]: those that are tried. Heat pumps and chillers modulate down to 0.1
 #: to 0.5 of what they have, which is less than the sum of their terminals.
-_LEAST = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5)
+LEAST = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5)
 
 #: What is regressed on, see `Source`.
 _STANDING = "standing"
@@ -171,9 +171,9 @@ def find_source(
     def error(design: FloatArray) -> float:
         return float(np.sum([left_out_error(design, bought[kind], per_day) for kind in kinds]))
 
-    designs = {least: _design(total[:, None], np.ones(1), loads.outdoor - middle, least) for least in _LEAST}
+    designs = {least: source_design(total[:, None], np.ones(1), loads.outdoor - middle, least) for least in LEAST}
     errors = {least: error(design) for least, design in designs.items()}
-    alike = min(error(_design(loads.level, shares, loads.outdoor - middle, least)) for least in _LEAST)
+    alike = min(error(source_design(loads.level, shares, loads.outdoor - middle, least)) for least in LEAST)
     least = min(errors, key=errors.__getitem__)
     if full <= 0.0 or not errors[least] < BETTER * min(alike, error(design_of(loads, range(len(maps))))):
         return None, {}
@@ -187,7 +187,19 @@ def find_source(
     return (source, base) if stands and source.dearer > 1.0 + WORSE else (None, {})
 
 
-def _design(level: FloatArray, shares: FloatArray, beyond: FloatArray, least: float) -> FloatArray:
-    """Columns of a regression: a constant, and `_FEATURES` summed over sources by their shares, shape (n_time, 5)."""
+def source_design(level: FloatArray, shares: FloatArray, beyond: FloatArray, least: float) -> FloatArray:
+    """Columns of a regression: a constant, and the features of `Source` summed over sources, shape (n_time, 5) [-].
+
+    Parameters
+    ----------
+    level : ndarray, shape (n_time, n)
+        Loads of each [-].
+    shares : ndarray, shape (n,)
+        Of each in the load of all [-].
+    beyond : ndarray, shape (n_time,)
+        Outdoor air less the temperature that coefficients are told at [K].
+    least : float
+        Load below which a source goes on and off [-].
+    """
     load, runs = level @ shares, np.minimum(level / least, 1.0) @ shares
     return np.column_stack([np.ones(len(load)), load, runs, load * beyond / PER, runs * beyond / PER])

@@ -11,6 +11,7 @@ import pandas as pd
 
 from mpc.errors import PlantError
 from mpc.kpi.record import PlantRecord
+from mpc.loop.actuators import Actuator
 from mpc.loop.plant import Controller, Measurements, Plant
 from mpc.loop.run import ClosedLoopRun, run_closed_loop
 from mpc.scenario.forecast import Forecast
@@ -49,12 +50,15 @@ class Site:
     capacity : tuple of tuple of float
         Of one source that feeds all zones' terminals, by its data sheet: outdoor air [K], rising, and the most heat
         that it gives there, or takes where it cools [W].
+    water : Actuator or None
+        Setpoint of the water that it supplies, where that is decided.
     """
 
     name: str
     areas: Mapping[str, float]
     location: Location
     capacity: tuple[tuple[float, float], ...] = ()
+    water: Actuator | None = None
 
 
 @dataclass(frozen=True, eq=False)

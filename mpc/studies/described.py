@@ -11,7 +11,7 @@ from typing import Any
 import pandas as pd
 
 from mpc.adapters.boptest.scenario import PERIOD_DAYS
-from mpc.adapters.described.actuators import described_actuators
+from mpc.adapters.described.actuators import described_actuator, described_actuators
 from mpc.adapters.described.load import load_plant
 from mpc.adapters.described.programs import SiteProgram
 from mpc.adapters.described.read import read_description
@@ -90,8 +90,11 @@ class PlantStudy:
         """Zones and place."""
         file = self.description
         areas, source = {name: zone.floor_area for name, zone in file.zones.items()}, file.source
-        sheet = () if source is None else source.cooling if self.cooling else source.heating
-        return Site(file.name, areas, file.location, sheet)
+        if source is None:
+            return Site(file.name, areas, file.location)
+        sheet, water = (source.cooling, source.cooling_water) if self.cooling else (source.heating, source.heating_water)
+        decided = None if water is None else described_actuator(water, file.actuators[water])
+        return Site(file.name, areas, file.location, sheet, decided)
 
     def plant(self) -> Any:
         """Make the plant, to be reset, and freed by leaving a ``with`` block."""

@@ -63,7 +63,7 @@ def run_experiment(
     with study.plant() as plant:
         study.steps(plant)  # refuses a plant without forecasts before it runs
         machines = study.machines(plant)
-        excitation = Excitation(machines, plant.control_step, settings)
+        excitation = Excitation(machines, plant.control_step, settings, study.site.water)
         steps = round(days * 86_400.0 / plant.control_step)
         report = None if progress is None else (lambda done, _: progress("experiment", done, steps))
         run, telemetry = run_recorded(plant, excitation, study.site, steps, report)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from mpc.adapters.described.schema import PlantFile
+from mpc.adapters.described.schema import Input, PlantFile
 from mpc.errors import PlantError
 from mpc.loop.actuators import Actuator
 from mpc.loop.conversion import SIGNAL_UNITS
@@ -28,12 +28,31 @@ def described_actuators(
     PlantError
         When neither gives an actuator's range.
     """
-    found = []
-    for name, entry in file.actuators.items():
-        ends = (ranges or {}).get(name, entry.range)
-        if ends is None:
-            raise PlantError(f"actuators.{name}.range", "a lowest and a highest value of a real building's", "none")
-        kind = POINT_TYPES.get(name.rpartition("/")[2])
-        unit = "1" if kind is None else SIGNAL_UNITS[kind.quantity]
-        found.append(Actuator(name, unit, *ends, False, entry.kind or "continuous", entry.minimum))
-    return tuple(found)
+    return tuple(described_actuator(name, told, ranges) for name, told in file.actuators.items())
+
+
+def described_actuator(
+    name: str, told: Input, ranges: Mapping[str, tuple[float, float]] | None = None
+) -> Actuator:
+    """Give one actuator of a description.
+
+    Parameters
+    ----------
+    name : str
+        Of it.
+    told : Input
+        What the description says of it.
+    ranges : mapping of str to tuple of float, optional
+        As of `described_actuators` [library's unit].
+
+    Raises
+    ------
+    PlantError
+        When neither gives its range.
+    """
+    ends = (ranges or {}).get(name, told.range)
+    if ends is None:
+        raise PlantError(f"actuators.{name}.range", "a lowest and a highest value of a real building's", "none")
+    kind = POINT_TYPES.get(name.rpartition("/")[2])
+    unit = "1" if kind is None else SIGNAL_UNITS[kind.quantity]
+    return Actuator(name, unit, *ends, False, told.kind or "continuous", told.minimum)

@@ -147,10 +147,15 @@ class SharedSource(Entry):
     heating, cooling : tuple of tuple of float
         Data sheets of what gives heat, and of what takes it: outdoor temperatures [K], rising, and the most at each
         [W].
+    heating_water, cooling_water : str, optional
+        Actuators with a range: setpoints of the water that it supplies to terminals with controllers of their own,
+        which optimal control may decide.
     """
 
     heating: DataSheet = ()
     cooling: DataSheet = ()
+    heating_water: Text | None = None
+    cooling_water: Text | None = None
 
 
 class Comfort(Entry):
@@ -381,6 +386,20 @@ class PlantFile(Entry):
         for name, part in (("prices", self.prices), ("emissions", self.emissions)):
             if self.energy.district_heating and part is not None and part.district_heating is None:
                 raise ValueError(f"expected {name}.district_heating, which is bought, found none")
+        return self
+
+    @model_validator(mode="after")
+    def _water_is_there(self) -> "PlantFile":
+        for key in ("heating_water", "cooling_water"):
+            name = None if self.source is None else getattr(self.source, key)
+            if name is None:
+                continue
+            if not name.endswith("_temperature_setpoint") or name not in self.actuators:
+                raise ValueError(f"expected a temperature setpoint of `actuators` as source.{key}, found {name!r}")
+            if self.actuators[name].range is None:
+                raise ValueError(f"expected a range of {name}, the coldest and the hottest water, found none")
+            if (sensor := name.removesuffix("setpoint") + "sensor") not in self.measurements:
+                raise ValueError(f"expected the measurement {sensor} beside source.{key}, found none")
         return self
 
     @model_validator(mode="after")

@@ -52,8 +52,9 @@ def beyond(weights: Any, load: Any) -> Any:
 
 
 def bought(
-    model: PlantModel, weights: FloatArray, states: FloatArray, levels: FloatArray, outdoor: FloatArray | float
-) -> FloatArray:
+    model: PlantModel, weights: FloatArray, states: FloatArray, levels: FloatArray, outdoor: FloatArray | float,
+    water: FloatArray | float | None = None,
+) -> FloatArray:  # fmt: skip
     """Power that each machine buys with what is beyond its map, shape (..., n_machine, n_carrier) [W].
 
     Parameters
@@ -62,10 +63,10 @@ def bought(
         Identified.
     weights : ndarray, shape (..., n_machine, `WEIGHTS`)
         See `weights_of` [W].
-    states, levels, outdoor : ndarray
+    states, levels, outdoor, water : ndarray
         As of `PlantModel.bought` [K less the reference], [-] and [K].
     """
-    powers = model.bought(states, levels, outdoor)
+    powers = model.bought(states, levels, outdoor, water)
     for k, found in enumerate(model.maps):
         if found.own is not None:
             power = beyond(np.moveaxis(weights[..., k, :], -1, 0), levels[..., k])

@@ -140,8 +140,9 @@ class IdentifiedController:
         settings: IdentifiedSettings | None = None,
         electric: Electric | None = None,
     ) -> None:
-        battery = [electric.command] if electric is not None and electric.command else []
-        need_actuator("mpc", [m.machine.name for m in model.maps] + battery, actuators, every=True)
+        beside = [electric.command] if electric is not None and electric.command else []
+        beside += [] if model.water is None else [model.water.actuator.name]
+        need_actuator("mpc", [m.machine.name for m in model.maps] + beside, actuators, every=True)
         model = model.bound(actuators)
         self.model, self.settings, self._location = model, settings or IdentifiedSettings(), location
         self._problem, self._observer = IdentifiedProblem(model, electric), GreyBoxObserver(model)
@@ -294,13 +295,14 @@ class IdentifiedController:
     def _data(self, ahead: Ahead, ends: tuple[FloatArray, FloatArray], before: FloatArray | None = None) -> StageData:
         """Fill the problem in, from the state that is estimated; a source counts by its tangents at a plan before."""
         price, state = self.settings.comfort_price, self._observer.state
-        planned = None if before is None else before[:, : len(self.model.maps)] @ self.model.shares
-        return self._problem.data(state, ahead, self._kept, price, ends, self._now, planned)
+        planned = None if before is None else before[:, : len(self.model.maps)]
+        most = None if self.model.water is None else self._thermostats.most(ahead.outdoor)
+        return self._problem.data(state, ahead, self._kept, price, ends, self._now, planned, most)
 
     def _solve(self, ahead: Ahead, ends: tuple[FloatArray, FloatArray]) -> StageSolution | None:
         """Plan within ends of the decisions; they are then duties and loads themselves."""
         before = None if self._plan is None else self._plan.shifted()[1]
-        if self.model.source is None:
+        if self.model.source is None and self.model.water is None:
             return self._solve_about(before, ahead, ends)
         plans: list[StageSolution] = []
         for _ in range(_PLANS):
@@ -363,7 +365,7 @@ class IdentifiedController:
                 values |= found.machine.told(self._thermostats.tell(k, level, most[k], zone, edges, shared), edges[1])
             else:
                 values[found.machine.name] = self._command(found, level)
-        return values
+        return values | self._thermostats.tell_water(levels, ahead.outdoor[:1], zone[0])
 
     def _edges_of(self, k: int, ahead: Ahead, measurements: Measurements) -> tuple[float, float]:
         """Edges of a machine's zones: that which it keeps them from, with the distance, and where it stops [K]."""
@@ -394,6 +396,8 @@ class IdentifiedController:
 
     def _powers(self, solution: StageSolution, ahead: Ahead) -> FloatArray:
         """Give expected electricity and other carriers, shape (N, 2) [W]."""
-        by_map = bought(self.model, ahead.beyond, solution.states[:-1], solution.decisions, ahead.outdoor)
+        states, levels = solution.states[:-1], solution.decisions[:, : len(self.model.maps)]
+        water = self._thermostats.water(levels, ahead.outdoor, states[0, : len(self.model.box.zones)] + REFERENCE)
+        by_map = bought(self.model, ahead.beyond, states, levels, ahead.outdoor, water)
         powers = by_map.sum(axis=1) + self.model.bought_anyway
         return np.column_stack([powers[:, 0], powers[:, 1:].sum(axis=1)])

@@ -43,7 +43,7 @@ class IdentifiedProblem:
     one of them can be fixed without another problem. Heat and power are the maps at the step's outdoor air and the
     emitter's temperature at its start, power with what `mpc.control.identified.beyond` adds. Bands are those of the
     air nodes. Machines that setpoints lead keep to what one source has for all of them (`SharedLimit`); what it buys
-    (`Source`) is a line over their load, a parameter of each step.
+    (`Source`) is a line over their load, a parameter of each step, and what hotter water costs (`SupplyWater`) a parabola.
 
     Parameters
     ----------
@@ -118,10 +118,10 @@ class IdentifiedProblem:
         """The problem of a step."""
         model, box = self.model, self.model.box
         nz, ns, m = len(box.zones), len(box.suns), len(model.maps)
-        line = len(CARRIERS) if model.source is not None else 0
-        sizes = [1, ns, nz, len(CARRIERS), m, m, m * WEIGHTS, 1, line, line]
+        line, square = (0 if part is None else len(CARRIERS) for part in (model.source, model.water))
+        sizes = [1, ns, nz, len(CARRIERS), m, m, m * WEIGHTS, 1, line, line, square, square]
         x, u, p, added = ca.SX.sym("x", 4 * nz), ca.SX.sym("u", m), ca.SX.sym("p", sum(sizes)), self._added
-        outdoor, sun, gain, price, low, high, weights, together, standing, by_load = ca.vertsplit(
+        outdoor, sun, gain, price, low, high, weights, together, standing, by_load, hot, hotter = ca.vertsplit(
             p, np.cumsum([0, *sizes]).tolist()
         )
         chosen = low + (high - low) * u
@@ -138,6 +138,9 @@ class IdentifiedProblem:
         for carrier in model.source.powers if model.source is not None else ():
             place = CARRIERS.index(carrier)
             powers.append((carrier, standing[place] + by_load[place] * total))
+        for carrier in model.water.powers if model.water is not None else ():
+            place, fed = CARRIERS.index(carrier), ca.dot(ca.DM(model.water.shares), chosen)
+            powers.append((carrier, hot[place] * fed + hotter[place] * fed * fed))
         cost, electricity = ca.SX(0), ca.SX(model.base.get(CARRIERS[0], 0.0))
         for carrier, power in powers:
             if added is not None and carrier == CARRIERS[0]:
@@ -167,6 +170,7 @@ class IdentifiedProblem:
         ends: tuple[FloatArray, FloatArray],
         now: ElectricNow | None = None,
         planned: FloatArray | None = None,
+        most: FloatArray | None = None,
     ) -> StageData:
         """Put together what changes.
 
@@ -184,8 +188,10 @@ class IdentifiedProblem:
             Lowest and highest duties and loads of the steps [-].
         now : ElectricNow, optional
             Of what is electric; none generated, nothing stored and no peak by default.
-        planned : ndarray, shape (N,), optional
-            Load of a source at which the lines of its power touch, see `Source.lines` [-].
+        planned : ndarray, shape (N, n_machine), optional
+            Loads at which the power of a source is touched, see `Source.lines` and `SupplyWater.curve` [-].
+        most : ndarray, shape (N, n_machine), optional
+            Largest loads, where the temperature of supply water is decided [-].
         """
         box, step, count = self.model.box, self.model.step, len(ahead.outdoor)
         nodes, zones = box.capacity.size, len(box.zones)
@@ -195,7 +201,12 @@ class IdentifiedProblem:
         together = np.minimum(ahead.together, _UNLIMITED)
         parameters = np.column_stack([ahead.outdoor, ahead.sun, gain, ahead.prices, *ends, weights, together])
         if self.model.source is not None:
-            parameters = np.column_stack([parameters, *self.model.source.lines(ahead.outdoor, together, planned)])
+            touched = None if planned is None else planned @ self.model.shares
+            parameters = np.column_stack([parameters, *self.model.source.lines(ahead.outdoor, together, touched)])
+        if self.model.water is not None:
+            most = np.ones((count, len(self.model.maps))) if most is None else most
+            zone = self.model.air(state[:zones] + REFERENCE)
+            parameters = np.column_stack([parameters, *self.model.water.curve(planned, most, zone)])
         # an edge lies in the bands of the step before and of the step after it; nothing can be done about the first
         near, far = ahead.edges(self.model.sign)
         near = np.minimum(near + back_off, far - _NARROWEST)

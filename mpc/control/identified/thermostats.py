@@ -48,7 +48,7 @@ class Thermostats:
         self._is_led = np.array([found.operation == "setpoint" for found in model.maps], dtype=bool)
         self._error = ForecastError(model.step)
         self._told, self._zone = np.full(len(model.maps), np.nan), np.full(len(model.box.zones), np.nan)
-        self._served = model.box.serves
+        self._served, self._water = model.box.serves, np.nan
 
     def most(self, outdoor: FloatArray) -> FloatArray:
         """Largest loads, shape (N, n_machine) [-]: 1 of machines that are commanded.
@@ -116,11 +116,16 @@ class Thermostats:
                 loads[k] = given / float(found.at(found.heat, 1.0, outdoor, REFERENCE))
                 missing[k] = self._told[k] - float(np.nanmean(end[self._served[k]]))
         full = np.array([found.above[1] for found in self._model.maps])
-        alone = self._shared.learn(weather, loads, (loads > _IDLE) & out_of_reach(missing, full), self._limits)
-        for k in np.flatnonzero(loads > _IDLE):
+        wanted, reached = (loads > _IDLE) & out_of_reach(missing, full), loads
+        if (water := self._model.water) is not None:
+            supply = measurements[water.sensor] if water.sensor in measurements else np.nan
+            wanted &= water.missed(self._water, supply)  # cold water is no limit of its source
+            reached = water.reached(loads, supply, self._model.air(zone))
+        alone = self._shared.learn(weather, loads, wanted, self._limits)
+        for k in np.flatnonzero((loads > _IDLE) & np.isfinite(reached)):
             # what several at their limit give at once says nothing of one of them alone
-            if (alone[k] and missing[k] > OUT_OF_REACH) or loads[k] > self._limits[k].at(np.array([weather]))[0]:
-                self._limits[k].learn(weather, float(loads[k]))
+            if (alone[k] and missing[k] > OUT_OF_REACH) or reached[k] > self._limits[k].at(np.array([weather]))[0]:
+                self._limits[k].learn(weather, float(reached[k]))
 
     def shares_all(self, levels: FloatArray, outdoor: FloatArray) -> bool:
         """Tell whether a step's loads take all that is relied on of a shared source.
@@ -169,3 +174,37 @@ class Thermostats:
         # plan leaves the band for hours that it fears not to keep
         self._told[k] = near if level <= _IDLE else max(min(value, far), near)
         return float(as_heated(self._told[k], self._sign))
+
+    def water(self, levels: FloatArray, outdoor: FloatArray, zone: FloatArray) -> FloatArray | None:
+        """Supply water for loads, shape (N,) [K]; None where it is not decided.
+
+        Parameters
+        ----------
+        levels : ndarray, shape (N, n_machine)
+            Planned loads [-].
+        outdoor : ndarray, shape (N,)
+            Outdoor air [K].
+        zone : ndarray, shape (n_zone,)
+            Air of the zones [K].
+        """
+        if self._model.water is None:
+            return None
+        return self._model.water.needed(levels, self.most(outdoor), self._model.air(zone))
+
+    def tell_water(self, levels: FloatArray, outdoor: FloatArray, zone: FloatArray) -> dict[str, float]:
+        """Choose the setpoint of supply water for the coming step, where it is decided [K].
+
+        Parameters
+        ----------
+        levels : ndarray, shape (n_machine,)
+            Planned loads [-].
+        outdoor : ndarray, shape (1,)
+            Outdoor air [K].
+        zone : ndarray, shape (n_zone,)
+            Air of the zones at the end of the step [K].
+        """
+        found = self.water(levels[None], outdoor, zone)
+        if self._model.water is None or found is None:
+            return {}
+        self._water = float(found[0])
+        return {self._model.water.actuator.name: self._water}

@@ -1,0 +1,302 @@
+"""Water that one source supplies to all terminals, where its temperature is decided: how hot it has to be, at what cost."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mpc.errors import PlantError
+from mpc.identify.curves import OUTDOOR, PER, Curve, interval_of
+from mpc.identify.limits import RUNS
+from mpc.identify.machines import Machine, as_heated
+from mpc.identify.regression import Loads, curve_of, design_of, least_squares, left_out_error
+from mpc.identify.source import LEAST, source_design
+from mpc.identify.telemetry import CARRIERS, SET, PlantTelemetry
+from mpc.loop.actuators import Actuator
+from thermal._types import BoolArray, FloatArray
+
+#: What is regressed on beside the loads: their sum times the water's temperature over 10 K, and by how much warmer the
+#: water has become in a step, over 10 K: a loop stores heat (the office's 1.6 MJ/K, the heat of 20 min of its pump in 10 K).
+_WATER, _STORED = "water", "stored"
+
+#: Share of the full load that water is kept hotter for than planned [-]: what model and forecast have wrong, zones'
+#: own controllers ask for within a step.
+_MARGIN = 0.1
+
+#: Least share of the way from the zone's air to the hottest water at which a load says what hotter water would give [-].
+_TELLS = 0.2
+
+#: How far water stays below its setpoint where its source gives all that it can [K].
+_MISSED = 1.0
+
+#: Load of the terminal that asks most over that of all, before there is a plan that says it [-].
+_UNEVEN = 1.3
+
+#: A load that is none [-].
+_NOTHING = 1e-6
+
+
+@dataclass(frozen=True)
+class SupplyWater:
+    """Temperature of the water of a heat pump, boiler or chiller that feeds all terminals.
+
+    A terminal gives heat in proportion to how far the water is from the zone's air, so that the coldest water that does
+    is that of the terminal which asks most. A source buys the more the hotter its water is,
+
+    ``P = ... + g Q (T_w - T) / 10 K``
+
+    with Q the load of all. What holds of heating holds of cooling in temperatures that are mirrored (`as_heated`): its
+    hottest water is the coldest that the actuator takes.
+
+    Parameters
+    ----------
+    actuator : Actuator
+        Setpoint of the water.
+    sign : float
+        1 where it heats, -1 where it cools [-].
+    shares : tuple of float
+        Of each machine in the load of all [-].
+    powers : mapping of str to Curve
+        Of each kind that is bought g, called ``water``, and what water takes that becomes 10 K warmer in a step,
+        ``stored`` [W].
+    temperature : float
+        T, the mean of the telemetry by load [K].
+    own : tuple of float
+        Setpoint that the plant itself has at 7 degC outdoors [K], and what it has more for a kelvin outdoors [K/K].
+    """
+
+    actuator: Actuator
+    sign: float
+    shares: tuple[float, ...]
+    powers: Mapping[str, Curve]
+    temperature: float
+    own: tuple[float, float]
+
+    @property
+    def sensor(self) -> str:
+        """Column with its measured temperature."""
+        return sensor_of(self.actuator.name)
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Coldest and hottest water, as `as_heated` [K]."""
+        low, high = sorted(as_heated(end, self.sign) for end in (self.actuator.lowest, self.actuator.highest))
+        return low, high
+
+    def reached(self, load: FloatArray, water: FloatArray | float, air: FloatArray) -> FloatArray:
+        """Tell what the hottest water would have given where a terminal gave all that it has, as loads [-].
+
+        Parameters
+        ----------
+        load : ndarray, shape (..., n_machine)
+            Given [-].
+        water : ndarray or float
+            Measured supply [K].
+        air : ndarray, shape (..., n_machine)
+            Of the machines' zones [K].
+        """
+        return np.asarray(load / np.maximum(self._way(water, air), _TELLS))
+
+    def _way(self, water: FloatArray | float, air: FloatArray) -> FloatArray:
+        """Share of the way from the air to the hottest water [-]."""
+        cold, hot = as_heated(air, self.sign), self.ends[1]
+        return np.asarray((as_heated(water, self.sign) - cold) / (hot - cold))
+
+    def missed(self, told: FloatArray | float, water: FloatArray | float) -> BoolArray:
+        """Tell where the source cannot hold the water.
+
+        Parameters
+        ----------
+        told, water : ndarray or float
+            Setpoint and measured supply [K].
+        """
+        return np.asarray(as_heated(told, self.sign) - as_heated(water, self.sign) > _MISSED)
+
+    def needed(self, loads: FloatArray, most: FloatArray, air: FloatArray) -> FloatArray:
+        """Choose the coldest water that gives loads and a tenth of the largest more, shape (...) [K].
+
+        Parameters
+        ----------
+        loads, most : ndarray, shape (..., n_machine)
+            Planned, and the largest with the hottest water [-].
+        air : ndarray, shape (n_machine,)
+            Of the machines' zones [K].
+        """
+        ask, cold = self._ask(loads, most), as_heated(air, self.sign)
+        low, hot = self.ends
+        wanted = cold + np.minimum(ask, 1.0) * (hot - cold)
+        wanted = np.where(np.asarray(loads) > RUNS * _MARGIN, wanted, low).max(axis=-1)
+        return np.asarray(as_heated(np.clip(wanted, low, hot), self.sign))
+
+    def _ask(self, loads: FloatArray, most: FloatArray) -> FloatArray:
+        return np.asarray(loads / np.maximum(most, _NOTHING) + _MARGIN)
+
+    def bought(self, loads: FloatArray, water: FloatArray | float) -> FloatArray:
+        """Power by machine and kind beyond that of water at `temperature`, shape (..., n_machine, n_carrier) [W].
+
+        Parameters
+        ----------
+        loads : ndarray, shape (..., n_machine)
+            Given [-].
+        water : ndarray, shape (...), or float
+            Supply [K].
+        """
+        hotter = self._hotter(as_heated(water, self.sign))
+        return np.asarray((loads * self.shares * hotter[..., None])[..., None] * self._by(_WATER))
+
+    def of_plant(self, outdoor: FloatArray | float) -> FloatArray:
+        """Give the water of the plant's own control, shape (...) [K].
+
+        Parameters
+        ----------
+        outdoor : ndarray or float
+            Outdoor air [K].
+        """
+        level, slope = self.own
+        return np.clip(level + slope * (np.asarray(outdoor) - OUTDOOR), self.actuator.lowest, self.actuator.highest)
+
+    def stored(self, water: FloatArray) -> FloatArray:
+        """Power of each kind for water that becomes warmer, less where it becomes colder, shape (n_time, n_carrier) [W].
+
+        Parameters
+        ----------
+        water : ndarray, shape (n_time,)
+            Measured supply [K].
+        """
+        return _stored(water, self.sign)[:, None] * self._by(_STORED)
+
+    def _hotter(self, water: FloatArray | float) -> FloatArray:
+        return np.asarray((water - as_heated(self.temperature, self.sign)) / PER)
+
+    def _by(self, feature: str) -> FloatArray:
+        """Coefficient of each of `CARRIERS`, shape (n_carrier,) [W]."""
+        return np.array([self.powers[kind].coefficients[feature] if kind in self.powers else 0.0 for kind in CARRIERS])
+
+    def curve(self, planned: FloatArray | None, most: FloatArray, air: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Power over the load Q of all about a plan, ``a Q + c Q²``: a and c of each kind, (N, n_carrier) each [W].
+
+        The terminal that asks most keeps its share of the load. Where a plan asks for colder water than there is, or
+        for the hottest, its temperature stays.
+
+        Parameters
+        ----------
+        planned : ndarray, shape (N, n_machine), or None
+            Loads [-]; None where there is no plan.
+        most : ndarray, shape (N, n_machine)
+            Largest loads with the hottest water [-].
+        air : ndarray, shape (n_machine,)
+            Of the machines' zones [K].
+        """
+        shares, (low, hot) = np.array(self.shares), self.ends
+        cold = float(as_heated(air, self.sign) @ shares)
+        whole = most @ shares
+        if planned is None:
+            steep = np.full(len(most), _UNEVEN) / whole
+            at = np.full(len(most), 0.5 * (low + hot))
+        else:
+            total, ask = planned @ shares, self._ask(planned, most).max(axis=-1)
+            steep = np.where(total > RUNS, (ask - _MARGIN) / np.maximum(total, _NOTHING), _UNEVEN / whole)
+            at = cold + ask * (hot - cold)
+        begin = cold + _MARGIN * (hot - cold)
+        stays = (at <= low) | (at >= hot)
+        by_load = np.where(stays, self._hotter(np.clip(at, low, hot)), self._hotter(begin))
+        square = np.where(stays, 0.0, steep * (hot - cold) / PER)
+        return by_load[:, None] * self._by(_WATER), square[:, None] * self._by(_WATER)
+
+
+def sensor_of(setpoint: str) -> str:
+    """Name the measured temperature beside a setpoint.
+
+    Parameters
+    ----------
+    setpoint : str
+        ``ENTITY/POINT`` of the actuator.
+
+    Examples
+    --------
+    >>> sensor_of("heat_pump/supply_water_temperature_setpoint")
+    'heat_pump/supply_water_temperature_sensor'
+    """
+    return setpoint.removesuffix("setpoint") + "sensor"
+
+
+def find_water(
+    telemetry: PlantTelemetry, machines: Sequence[Machine], loads: Loads, bought: Mapping[str, FloatArray]
+) -> SupplyWater | None:
+    """Find what a kelvin of the supply water costs; None where nothing is to be decided, or hotter water costs no more.
+
+    Parameters
+    ----------
+    telemetry : PlantTelemetry
+        In which the water's setpoint was moved.
+    machines : sequence of Machine
+        Terminals.
+    loads : Loads
+        Of the machines [-].
+    bought : mapping of str to ndarray
+        Power of each kind that the plant buys, shape (n_time,) [W].
+
+    Raises
+    ------
+    PlantError
+        When the water is not measured.
+    """
+    actuator = telemetry.site.water
+    if actuator is None:
+        return None
+    sensor, sign = sensor_of(actuator.name), machines[0].sign
+    PlantError.unless(sensor in telemetry.frame, f"telemetry: {sensor}", "the temperature of the source's water", "none",
+                      f"add it to `measurements`, or leave {actuator.name} out of `source`")  # fmt: skip
+    full = np.array([machine.full(telemetry) for machine in machines])
+    water = telemetry.column(sensor)
+    total = loads.level @ (full / full.sum())
+    rows = loads.known & np.isfinite(total)
+    middle = float(np.average(water[rows], weights=total[rows]))
+    hotter = (as_heated(water, sign) - as_heated(middle, sign)) / PER
+    beyond, per_day = loads.outdoor - float(np.median(loads.outdoor)), round(86_400.0 / telemetry.step)
+    designs = [source_design(total[:, None], np.ones(1), beyond, least) for least in LEAST]
+    designs.append(design_of(loads, range(len(machines))))
+    powers = {}
+    for kind, values in bought.items():
+        told = [np.column_stack([design, _stored(water, sign), total * hotter]) for design in designs]
+        design = min(told, key=lambda columns: left_out_error(columns, values, per_day))
+        seen = rows & np.isfinite(values)
+        found, deviations = least_squares(design[seen], values[seen])
+        powers[kind] = curve_of([*[""] * (design.shape[1] - 2), _STORED, _WATER], found, deviations)
+    powers = {kind: curve for kind, curve in powers.items() if interval_of(curve, _WATER)[0] > 0.0}
+    shares = tuple((full / full.sum()).tolist())
+    return SupplyWater(actuator, sign, shares, powers, middle, _own(telemetry, actuator.name, middle)) if powers else None
+
+
+def _stored(water: FloatArray, sign: float) -> FloatArray:
+    """By how much water has become warmer in each step, colder where it cools, over 10 K, shape (n_time,) [-]."""
+    return np.asarray(sign * np.diff(water, prepend=water[:1]) / PER)
+
+
+def told_water(telemetry: PlantTelemetry, name: str) -> FloatArray:
+    """Setpoint of the water as it was told, else as the plant has it, shape (n_time,) [K]; NaN where nothing says it.
+
+    Parameters
+    ----------
+    telemetry : PlantTelemetry
+        Of the plant.
+    name : str
+        Of the actuator.
+    """
+    nothing = np.full(len(telemetry.frame), np.nan)
+    told, has = (telemetry.frame[c].to_numpy(dtype=float) if c in telemetry.frame else nothing
+                 for c in (f"{SET}{name}", name))  # fmt: skip
+    return np.where(np.isfinite(told), told, has)
+
+
+def _own(telemetry: PlantTelemetry, name: str, middle: float) -> tuple[float, float]:
+    """Setpoint of the plant itself over outdoor air: a line through the steps in which it had the water."""
+    has = telemetry.frame[name].to_numpy(dtype=float) if name in telemetry.frame else telemetry.column(sensor_of(name))
+    told = telemetry.frame.get(f"{SET}{name}")
+    free = np.isfinite(has) & (True if told is None else told.isna().to_numpy())
+    if free.sum() < 8:
+        return middle, 0.0
+    slope, level = np.polyfit(telemetry.outdoor[free] - OUTDOOR, has[free], 1)
+    return float(level), float(slope)
