@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -31,8 +32,8 @@ _TELLS = 0.2
 #: How far water stays below its setpoint where its source gives all that it can [K].
 _MISSED = 1.0
 
-#: Load of the terminal that asks most over that of all, before there is a plan that says it [-].
-_UNEVEN = 1.3
+#: How far the corner is rounded at which terminals ask for hotter water than the coldest [K].
+_ROUND = 1.0
 
 #: A load that is none [-].
 _NOTHING = 1e-6
@@ -170,15 +171,17 @@ class SupplyWater:
     def _hotter(self, water: FloatArray | float) -> FloatArray:
         return np.asarray((water - as_heated(self.temperature, self.sign)) / PER)
 
+    @property
+    def by_kelvin(self) -> FloatArray:
+        """What a kelvin of all terminals' full load costs of each of `CARRIERS`, shape (n_carrier,) [W/K]."""
+        return self._by(_WATER) / PER
+
     def _by(self, feature: str) -> FloatArray:
         """Coefficient of each of `CARRIERS`, shape (n_carrier,) [W]."""
         return np.array([self.powers[kind].coefficients[feature] if kind in self.powers else 0.0 for kind in CARRIERS])
 
-    def curve(self, planned: FloatArray | None, most: FloatArray, air: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Power over the load Q of all about a plan, ``a Q + c Q²``: a and c of each kind, (N, n_carrier) each [W].
-
-        The terminal that asks most keeps its share of the load. Where a plan asks for colder water than there is, or
-        for the hottest, its temperature stays.
+    def line(self, planned: FloatArray | None, most: FloatArray, air: FloatArray) -> FloatArray:
+        """Parameters of `hotter` about a plan, shape (N, 3): at no load and by load [K], and of the plan [-].
 
         Parameters
         ----------
@@ -189,21 +192,37 @@ class SupplyWater:
         air : ndarray, shape (n_machine,)
             Of the machines' zones [K].
         """
-        shares, (low, hot) = np.array(self.shares), self.ends
-        cold = float(as_heated(air, self.sign) @ shares)
-        whole = most @ shares
-        if planned is None:
-            steep = np.full(len(most), _UNEVEN) / whole
-            at = np.full(len(most), 0.5 * (low + hot))
-        else:
-            total, ask = planned @ shares, self._ask(planned, most).max(axis=-1)
-            steep = np.where(total > RUNS, (ask - _MARGIN) / np.maximum(total, _NOTHING), _UNEVEN / whole)
-            at = cold + ask * (hot - cold)
-        begin = cold + _MARGIN * (hot - cold)
-        stays = (at <= low) | (at >= hot)
-        by_load = np.where(stays, self._hotter(np.clip(at, low, hot)), self._hotter(begin))
-        square = np.where(stays, 0.0, steep * (hot - cold) / PER)
-        return by_load[:, None] * self._by(_WATER), square[:, None] * self._by(_WATER)
+        (low, hot), cold = self.ends, float(as_heated(air, self.sign) @ np.array(self.shares))
+        line = np.tile([cold + _MARGIN * (hot - cold) - low, hot - cold, 1.0], (len(most), 1))
+        if planned is not None:
+            shares = np.array(self.shares)
+            above = np.maximum(line[:, :1] + line[:, 1:2] * planned / most, 0.0)
+            all_pay, each_pays = above.max(axis=-1) * (planned @ shares), (above * planned) @ shares
+            line[:, 2] = np.where(each_pays > _NOTHING, all_pay / np.maximum(each_pays, _NOTHING), 1.0)
+        return line
+
+    def hotter(self, load: Any, part: Any, line: Any) -> Any:
+        """Give what loads cost by hot water, with numbers or symbols: kelvins over `temperature` times loads [K].
+
+        ``Σ w_k q_k (T_low - T + e (T_k - T_low))`` with w the shares and T_k the water that terminal k asks for itself,
+        on a line over its load, ``T_low`` at least. So each terminal pays for its own water, and e makes the sum what it
+        is at the plan, where all have that of the one which asks most. It is convex.
+
+        Parameters
+        ----------
+        load, part : indexable of length n_machine
+            Loads, and as parts of the largest [-].
+        line : indexable of length 3
+            Of `line`.
+        """
+        begin, by_load, uneven = line[0], line[1], line[2]
+        least = self.ends[0] - as_heated(self.temperature, self.sign)
+        total = 0.0
+        for k, share in enumerate(self.shares):
+            asked = begin + by_load * part[k]
+            above = 0.5 * (asked + (asked * asked + _ROUND**2) ** 0.5)
+            total = total + share * load[k] * (least + uneven * above)
+        return total
 
 
 def sensor_of(setpoint: str) -> str:

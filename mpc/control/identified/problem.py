@@ -43,7 +43,7 @@ class IdentifiedProblem:
     one of them can be fixed without another problem. Heat and power are the maps at the step's outdoor air and the
     emitter's temperature at its start, power with what `mpc.control.identified.beyond` adds. Bands are those of the
     air nodes. Machines that setpoints lead keep to what one source has for all of them (`SharedLimit`); what it buys
-    (`Source`) is a line over their load, a parameter of each step, and what hotter water costs (`SupplyWater`) a parabola.
+    (`Source`) is a line over their load, a parameter of each step; what hotter water costs is added (`SupplyWater`).
 
     Parameters
     ----------
@@ -118,10 +118,10 @@ class IdentifiedProblem:
         """The problem of a step."""
         model, box = self.model, self.model.box
         nz, ns, m = len(box.zones), len(box.suns), len(model.maps)
-        line, square = (0 if part is None else len(CARRIERS) for part in (model.source, model.water))
-        sizes = [1, ns, nz, len(CARRIERS), m, m, m * WEIGHTS, 1, line, line, square, square]
+        line, hot = len(CARRIERS) if model.source is not None else 0, (0, 0) if model.water is None else (3, m)
+        sizes = [1, ns, nz, len(CARRIERS), m, m, m * WEIGHTS, 1, line, line, *hot]
         x, u, p, added = ca.SX.sym("x", 4 * nz), ca.SX.sym("u", m), ca.SX.sym("p", sum(sizes)), self._added
-        outdoor, sun, gain, price, low, high, weights, together, standing, by_load, hot, hotter = ca.vertsplit(
+        outdoor, sun, gain, price, low, high, weights, together, standing, by_load, water, most = ca.vertsplit(
             p, np.cumsum([0, *sizes]).tolist()
         )
         chosen = low + (high - low) * u
@@ -138,9 +138,9 @@ class IdentifiedProblem:
         for carrier in model.source.powers if model.source is not None else ():
             place = CARRIERS.index(carrier)
             powers.append((carrier, standing[place] + by_load[place] * total))
-        for carrier in model.water.powers if model.water is not None else ():
-            place, fed = CARRIERS.index(carrier), ca.dot(ca.DM(model.water.shares), chosen)
-            powers.append((carrier, hot[place] * fed + hotter[place] * fed * fed))
+        if model.water is not None:
+            hotter = model.water.hotter(chosen, chosen / most, water)
+            powers += [(carrier, by * hotter) for carrier, by in zip(CARRIERS, model.water.by_kelvin, strict=True) if by]
         cost, electricity = ca.SX(0), ca.SX(model.base.get(CARRIERS[0], 0.0))
         for carrier, power in powers:
             if added is not None and carrier == CARRIERS[0]:
@@ -206,7 +206,7 @@ class IdentifiedProblem:
         if self.model.water is not None:
             most = np.ones((count, len(self.model.maps))) if most is None else most
             zone = self.model.air(state[:zones] + REFERENCE)
-            parameters = np.column_stack([parameters, *self.model.water.curve(planned, most, zone)])
+            parameters = np.column_stack([parameters, self.model.water.line(planned, most, zone), most])
         # an edge lies in the bands of the step before and of the step after it; nothing can be done about the first
         near, far = ahead.edges(self.model.sign)
         near = np.minimum(near + back_off, far - _NARROWEST)
