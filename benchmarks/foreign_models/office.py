@@ -116,6 +116,8 @@ def office(of: Office | None = None) -> Objects:
         }},
     })  # fmt: skip
     ep.merge(model, supply_water("HOT LOOP", RESET))
+    if of.chiller is not None:
+        ep.merge(model, supply_water("COLD LOOP", (_COLD_WATER, 0.0, _COLD_WATER, 40.0)))
     return model
 
 
@@ -198,5 +200,10 @@ def description(of: Office | None = None) -> dict[str, Any]:
     }
     told["actuators"] |= acted
     source = {"heating": of.machine.sheet(_HOT_WATER), "heating_water": "heat_pump/supply_water_temperature_setpoint"}
-    source |= {} if of.chiller is None else {"cooling": of.chiller.sheet(_COLD_WATER)}
+    if of.chiller is not None:
+        measured, acted = supply_water_points(_CHILLER, "chiller", "COLD LOOP", "7 degC", "15 degC", "chilled_water")
+        told["measurements"], told["actuators"] = told["measurements"] | measured, told["actuators"] | acted
+        source |= {
+            "cooling": of.chiller.sheet(_COLD_WATER), "cooling_water": "chiller/supply_water_temperature_setpoint",
+        }  # fmt: skip
     return told | {"source": source, "energy": {"electricity": electricity}}

@@ -164,4 +164,5 @@ def description(of: Dwelling | None = None) -> dict[str, Any]:
         "boiler/heating_power_sensor": f"{BOILER}, Boiler Heating Rate",
     }
     told["actuators"] |= acted
-    return told | {"energy": {"electricity": [pump, fan], "gas": [gas]}, "prices": {"gas": GAS}}
+    source = {"heating_water": "boiler/supply_water_temperature_setpoint"}
+    return told | {"source": source, "energy": {"electricity": [pump, fan], "gas": [gas]}, "prices": {"gas": GAS}}

@@ -10,13 +10,16 @@ from energyplus_trials.frame import Objects
 from foreign_models import objects as ep
 
 _RESET = """
-SET wanted_water = {at_zero} - {slope} * outdoor
-SET wanted_water = @Min wanted_water {warmest}
-SET wanted_water = @Max wanted_water {coolest}
-IF told_water > 0.0
-  SET wanted_water = told_water
+SET {name}_wanted = {at_zero} - {slope} * {name}_outdoor
+SET {name}_wanted = @Min {name}_wanted {warmest}
+SET {name}_wanted = @Max {name}_wanted {coolest}
+IF {name}_told > 0.0
+  SET {name}_wanted = {name}_told
 ENDIF
 """
+
+#: Schedule that tells the supply water of a loop.
+_SUPPLY = "{} SUPPLY"
 
 
 def water_loop(
@@ -135,7 +138,7 @@ def scheduled_loop(
 
 
 def supply_water(loop: str, reset: tuple[float, float, float, float]) -> Objects:
-    """Return the program of a loop's supply water: by the outdoor temperature, unless ``SUPPLY WATER`` tells it.
+    """Return the program of a loop's supply water: by the outdoor temperature, unless ``LOOP SUPPLY`` tells it.
 
     Parameters
     ----------
@@ -145,21 +148,22 @@ def supply_water(loop: str, reset: tuple[float, float, float, float]) -> Objects
         Warmest water and the outdoor air below which it is that warm, coolest water and the outdoor air above which it
         is that cool, on a straight line in between [degC].
     """
-    found: Objects = {"Schedule:Constant": {"SUPPLY WATER": ep.constant(ep.OWN)}}
+    name = loop.lower().replace(" ", "_")
+    found: Objects = {"Schedule:Constant": {_SUPPLY.format(loop): ep.constant(ep.OWN)}}
     ep.merge(found, ep.sensors({
-        "outdoor": ("Environment", "Site Outdoor Air Drybulb Temperature"),
-        "told_water": ("SUPPLY WATER", "Schedule Value"),
+        f"{name}_outdoor": ("Environment", "Site Outdoor Air Drybulb Temperature"),
+        f"{name}_told": (_SUPPLY.format(loop), "Schedule Value"),
     }))  # fmt: skip
-    ep.merge(found, ep.actuators({"wanted_water": (f"{loop} water", "Schedule:Constant", "Schedule Value")}))
+    ep.merge(found, ep.actuators({f"{name}_wanted": (f"{loop} water", "Schedule:Constant", "Schedule Value")}))
     warmest, cold, coolest, mild = reset
     slope = (warmest - coolest) / (mild - cold)
     line = {"warmest": warmest, "coolest": coolest, "slope": slope, "at_zero": warmest + slope * cold}
-    ep.merge(found, ep.program("supply_water", _RESET.format(**line)))
+    ep.merge(found, ep.program(f"{name}_supply", _RESET.format(name=name, **line)))
     return found
 
 
 def supply_water_points(
-    machine: str, entity: str, loop: str, lowest: str, highest: str
+    machine: str, entity: str, loop: str, lowest: str, highest: str, pump: str = "hot_water"
 ) -> tuple[dict[str, str], dict[str, Any]]:
     """Return measured points and the actuator of a loop's water (`supply_water`), as ``plant.yaml`` has them.
 
@@ -171,11 +175,13 @@ def supply_water_points(
         A `scheduled_loop`.
     lowest, highest : str
         Range of the supply water, with units.
+    pump : str
+        Our name of what the loop's pump belongs to.
     """
     setpoint = f"{entity}/supply_water_temperature_setpoint"
-    signal = "SUPPLY WATER, Schedule:Constant, Schedule Value"
+    signal = f"{_SUPPLY.format(loop)}, Schedule:Constant, Schedule Value"
     measured = {
-        "hot_water/pump_power_sensor": f"{loop} pump, Pump Electricity Rate",
+        f"{pump}/pump_power_sensor": f"{loop} pump, Pump Electricity Rate",
         f"{entity}/supply_water_temperature_sensor": f"{machine} out, System Node Temperature",
         f"{entity}/return_water_temperature_sensor": f"{machine} in, System Node Temperature",
         setpoint: f"{loop} water, Schedule Value",

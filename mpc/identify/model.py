@@ -128,8 +128,9 @@ class PlantModel:
         return heat
 
     def bought(
-        self, states: FloatArray, levels: FloatArray, outdoor: FloatArray | float, water: FloatArray | float | None = None
-    ) -> FloatArray:
+        self, states: FloatArray, levels: FloatArray, outdoor: FloatArray | float,
+        water: FloatArray | float | None = None,
+    ) -> FloatArray:  # fmt: skip
         """Power that each machine buys, shape (..., n_machine, n_carrier) [W]; `base` is not among it.
 
         What a source buys is shared out by load.

@@ -1,4 +1,4 @@
-"""Water that one source supplies to all terminals, where its temperature is decided: how hot it has to be, at what cost."""
+"""Water that one source supplies to all terminals, where its temperature is decided: how hot it is, at what cost."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from mpc.loop.actuators import Actuator
 from thermal._types import BoolArray, FloatArray
 
 #: What is regressed on beside the loads: their sum times the water's temperature over 10 K, and by how much warmer the
-#: water has become in a step, over 10 K: a loop stores heat (the office's 1.6 MJ/K, the heat of 20 min of its pump in 10 K).
+#: water has become in a step, over 10 K: a loop stores heat (the office's in 10 K that of 13 min of its heat pump).
 _WATER, _STORED = "water", "stored"
 
 #: Share of the full load that water is kept hotter for than planned [-]: what model and forecast have wrong, zones'
 #: own controllers ask for within a step.
 _MARGIN = 0.1
 
-#: Least share of the way from the zone's air to the hottest water at which a load says what hotter water would give [-].
+#: Least share of the way from a zone's air to the hottest water at which a load says what that would give [-].
 _TELLS = 0.2
 
 #: How far water stays below its setpoint where its source gives all that it can [K].
@@ -159,7 +159,7 @@ class SupplyWater:
         return np.clip(level + slope * (np.asarray(outdoor) - OUTDOOR), self.actuator.lowest, self.actuator.highest)
 
     def stored(self, water: FloatArray) -> FloatArray:
-        """Power of each kind for water that becomes warmer, less where it becomes colder, shape (n_time, n_carrier) [W].
+        """Power of each kind that warms the water, negative where it cools down, shape (n_time, n_carrier) [W].
 
         Parameters
         ----------
@@ -204,9 +204,9 @@ class SupplyWater:
     def hotter(self, load: Any, part: Any, line: Any) -> Any:
         """Give what loads cost by hot water, with numbers or symbols: kelvins over `temperature` times loads [K].
 
-        ``Σ w_k q_k (T_low - T + e (T_k - T_low))`` with w the shares and T_k the water that terminal k asks for itself,
-        on a line over its load, ``T_low`` at least. So each terminal pays for its own water, and e makes the sum what it
-        is at the plan, where all have that of the one which asks most. It is convex.
+        ``Σ w_k q_k (T_low - T + e (T_k - T_low))`` with w the shares and T_k the water that terminal k asks for
+        itself, on a line over its load, ``T_low`` at least. So each terminal pays for its own water, and e makes the
+        sum what it is at the plan, where all have that of the one which asks most. It is convex.
 
         Parameters
         ----------
@@ -260,14 +260,21 @@ def find_water(
     Raises
     ------
     PlantError
-        When the water is not measured.
+        When the water is not measured, or a machine is no setpoint of a zone whose heat has a meter.
     """
     actuator = telemetry.site.water
     if actuator is None:
         return None
     sensor, sign = sensor_of(actuator.name), machines[0].sign
-    PlantError.unless(sensor in telemetry.frame, f"telemetry: {sensor}", "the temperature of the source's water", "none",
-                      f"add it to `measurements`, or leave {actuator.name} out of `source`")  # fmt: skip
+    PlantError.unless(
+        sensor in telemetry.frame, f"telemetry: {sensor}", "the temperature of the source's water", "none",
+        f"add it to `measurements`, or leave {actuator.name} out of `source`",
+    )  # fmt: skip
+    others = [machine.name for machine in machines if machine.role != "setpoint" or not machine.heat]
+    PlantError.unless(
+        not others, f"source: {actuator.name}", "setpoints of zones whose heat has a meter", ", ".join(others),
+        "leave it out of `source`, and the plant's own control has the water",
+    )  # fmt: skip
     full = np.array([machine.full(telemetry) for machine in machines])
     water = telemetry.column(sensor)
     total = loads.level @ (full / full.sum())
@@ -285,8 +292,10 @@ def find_water(
         found, deviations = least_squares(design[seen], values[seen])
         powers[kind] = curve_of([*[""] * (design.shape[1] - 2), _STORED, _WATER], found, deviations)
     powers = {kind: curve for kind, curve in powers.items() if interval_of(curve, _WATER)[0] > 0.0}
-    shares = tuple((full / full.sum()).tolist())
-    return SupplyWater(actuator, sign, shares, powers, middle, _own(telemetry, actuator.name, middle)) if powers else None
+    if not powers:
+        return None
+    own = _own(telemetry, actuator.name, middle)
+    return SupplyWater(actuator, sign, tuple((full / full.sum()).tolist()), powers, middle, own)
 
 
 def _stored(water: FloatArray, sign: float) -> FloatArray:

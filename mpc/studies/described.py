@@ -92,9 +92,10 @@ class PlantStudy:
         areas, source = {name: zone.floor_area for name, zone in file.zones.items()}, file.source
         if source is None:
             return Site(file.name, areas, file.location)
-        sheet, water = (source.cooling, source.cooling_water) if self.cooling else (source.heating, source.heating_water)
-        decided = None if water is None else described_actuator(water, file.actuators[water])
-        return Site(file.name, areas, file.location, sheet, decided)
+        heats, cools = (source.heating, source.heating_water), (source.cooling, source.cooling_water)
+        sheet, name = cools if self.cooling else heats
+        water = None if name is None else described_actuator(name, file.actuators[name])
+        return Site(file.name, areas, file.location, sheet, water)
 
     def plant(self) -> Any:
         """Make the plant, to be reset, and freed by leaving a ``with`` block."""

@@ -16,7 +16,7 @@ from thermal._types import FloatArray
 
 def estimate_rule(
     problem: IdentifiedProblem, ahead: Ahead, parameters: FloatArray, planned: tuple[FloatArray, FloatArray],
-    most: FloatArray, on: FloatArray,
+    most: FloatArray, on: FloatArray, water: FloatArray | None = None,
 ) -> RuleEstimate:  # fmt: skip
     """Let the rule of `mpc.baselines.plants.FullSpeed` run on the model from where a plan begins, and compare.
 
@@ -34,6 +34,8 @@ def estimate_rule(
         Largest levels [-].
     on : ndarray of bool, shape (m,)
         Machines that run now [-].
+    water : ndarray, shape (N,), optional
+        Supply water of the plan where it is decided; the rule has that of the plant itself [K].
 
     Returns
     -------
@@ -42,10 +44,10 @@ def estimate_rule(
     """
     states, levels = planned
     by_rule = _rule(problem, ahead, parameters, (states[0], most, on))
-    cost, heat = _bought(problem, ahead, *by_rule)
+    cost, heat = _bought(problem, ahead, *by_rule, None)
     left = problem.model.sign * float(problem.model.box.capacity @ (states[-1] - by_rule[0][-1]))
     stored = left * cost / heat if heat > 0.0 else 0.0
-    return RuleEstimate(_bought(problem, ahead, states, levels)[0], cost, stored)
+    return RuleEstimate(_bought(problem, ahead, states, levels, water)[0], cost, stored)
 
 
 def _rule(
@@ -87,10 +89,12 @@ def _rule(
     return states, levels
 
 
-def _bought(problem: IdentifiedProblem, ahead: Ahead, states: FloatArray, levels: FloatArray) -> tuple[float, float]:
+def _bought(
+    problem: IdentifiedProblem, ahead: Ahead, states: FloatArray, levels: FloatArray, water: FloatArray | None
+) -> tuple[float, float]:
     """Cost [currency] and heat [J] of levels along states, or what is taken where machines cool."""
     model = problem.model
-    powers = bought(model, ahead.beyond, states[:-1], levels, ahead.outdoor).sum(axis=1) + model.bought_anyway
+    powers = bought(model, ahead.beyond, states[:-1], levels, ahead.outdoor, water).sum(axis=1) + model.bought_anyway
     heat = model.box.delivered(model.heat(states[:-1], levels, ahead.outdoor), ahead.outdoor)
     cost = float((powers * ahead.prices).sum()) * model.step / KILOWATT_HOUR
     return cost, model.sign * float(heat.sum()) * model.step

@@ -21,14 +21,13 @@ from mpc.control.identified.meter import ElectricMeter
 from mpc.control.identified.mixed_integer import WHOLE, RunLimits, RunPlanner
 from mpc.control.identified.observer import GreyBoxObserver
 from mpc.control.identified.problem import SCALE, IdentifiedProblem
-from mpc.control.identified.runs import HALF, Runs, RunSettings
+from mpc.control.identified.runs import HALF, Runs, RunSettings, command_of
 from mpc.control.identified.thermostats import Thermostats
 from mpc.control.rule_estimate import RuleEstimate
 from mpc.control.solvers.solution import Status
 from mpc.control.solvers.stages import StageData, StageMethod, StageSolution, StageSolver
 from mpc.errors import ControlError
 from mpc.identify.machines import as_heated
-from mpc.identify.maps import MachineMap
 from mpc.identify.model import PlantModel
 from mpc.loop.actuators import Actuator, need_actuator
 from mpc.loop.plant import Measurements
@@ -364,7 +363,7 @@ class IdentifiedController:
                 edges = self._edges_of(k, ahead, measurements)
                 values |= found.machine.told(self._thermostats.tell(k, level, most[k], zone, edges, shared), edges[1])
             else:
-                values[found.machine.name] = self._command(found, level)
+                values[found.machine.name] = command_of(found, level)
         return values | self._thermostats.tell_water(levels, ahead.outdoor[:1], zone[0])
 
     def _edges_of(self, k: int, ahead: Ahead, measurements: Measurements) -> tuple[float, float]:
@@ -375,29 +374,23 @@ class IdentifiedController:
         stops = self.model.maps[k].machine.farthest(kept, other, measurements)
         return as_heated(kept, sign), as_heated(stops, sign)
 
-    def _command(self, found: MachineMap, level: float) -> float:
-        """Value of a machine's actuator for a level."""
-        actuator = found.machine.actuator
-        low, high = actuator.lowest, actuator.highest
-        if found.operation == "duty":
-            return high if level > HALF else low
-        value = low + level * (high - low)
-        if actuator.minimum is not None and value < actuator.minimum:
-            return actuator.minimum if value > 0.5 * (low + actuator.minimum) else low
-        return float(np.clip(value, low, high))
-
     def _compared(self, solution: StageSolution, ahead: Ahead, on: FloatArray) -> Callable[[], RuleEstimate]:
         """Give what holds a plan against the rule on the same model."""
         most = self._thermostats.most(ahead.outdoor)
         free = np.zeros_like(most), np.ones_like(most)
         data = self._problem.data(self._observer.state, ahead, self._kept, self.settings.comfort_price, free)
         planned = solution.states, solution.decisions
-        return partial(estimate_rule, self._problem, ahead, data.parameters, planned, most, on)
+        water = self._water_along(solution, ahead)
+        return partial(estimate_rule, self._problem, ahead, data.parameters, planned, most, on, water)
+
+    def _water_along(self, solution: StageSolution, ahead: Ahead) -> FloatArray | None:
+        """Supply water of a plan, shape (N,) [K]; None where it is not decided."""
+        levels, zone = solution.decisions[:, : len(self.model.maps)], solution.states[0, : len(self.model.box.zones)]
+        return self._thermostats.water(levels, ahead.outdoor, zone + REFERENCE)
 
     def _powers(self, solution: StageSolution, ahead: Ahead) -> FloatArray:
         """Give expected electricity and other carriers, shape (N, 2) [W]."""
-        states, levels = solution.states[:-1], solution.decisions[:, : len(self.model.maps)]
-        water = self._thermostats.water(levels, ahead.outdoor, states[0, : len(self.model.box.zones)] + REFERENCE)
-        by_map = bought(self.model, ahead.beyond, states, levels, ahead.outdoor, water)
+        states, water = solution.states[:-1], self._water_along(solution, ahead)
+        by_map = bought(self.model, ahead.beyond, states, solution.decisions, ahead.outdoor, water)
         powers = by_map.sum(axis=1) + self.model.bought_anyway
         return np.column_stack([powers[:, 0], powers[:, 1:].sum(axis=1)])

@@ -71,6 +71,8 @@ class IdentifiedProblem:
             most += float(
                 model.source.lines(weather, nothing + np.inf, nothing)[1][:, 0].max()
             )  # it counts by tangents
+        if model.water is not None:
+            most += float(model.water.by_kelvin[0]) * (model.water.ends[1] - model.water.ends[0])
         return ElectricStage(self.electric, 1.5 * most, model.step)
 
     @property
@@ -139,8 +141,8 @@ class IdentifiedProblem:
             place = CARRIERS.index(carrier)
             powers.append((carrier, standing[place] + by_load[place] * total))
         if model.water is not None:
-            hotter = model.water.hotter(chosen, chosen / most, water)
-            powers += [(carrier, by * hotter) for carrier, by in zip(CARRIERS, model.water.by_kelvin, strict=True) if by]
+            hotter, prices = model.water.hotter(chosen, chosen / most, water), model.water.by_kelvin
+            powers += [(carrier, by * hotter) for carrier, by in zip(CARRIERS, prices, strict=True) if by]
         cost, electricity = ca.SX(0), ca.SX(model.base.get(CARRIERS[0], 0.0))
         for carrier, power in powers:
             if added is not None and carrier == CARRIERS[0]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from mpc.identify.maps import MachineMap
 from thermal._types import FloatArray
 
 #: A duty above this is a run [-].
@@ -109,3 +110,23 @@ class Runs:
         self.left = min(self.left - float(on and not self.on) + self.settings.back, self.settings.most)
         self.since = 1 if on != self.on else self.since + 1
         self.on = on
+
+
+def command_of(found: MachineMap, level: float) -> float:
+    """Value of a machine's actuator for a level [its unit].
+
+    Parameters
+    ----------
+    found : MachineMap
+        Of a machine that is commanded.
+    level : float
+        Duty or load [-].
+    """
+    actuator = found.machine.actuator
+    low, high = actuator.lowest, actuator.highest
+    if found.operation == "duty":
+        return high if level > HALF else low
+    value = low + level * (high - low)
+    if actuator.minimum is not None and value < actuator.minimum:
+        return actuator.minimum if value > 0.5 * (low + actuator.minimum) else low
+    return float(np.clip(value, low, high))
