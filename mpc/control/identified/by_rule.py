@@ -44,7 +44,7 @@ def estimate_rule(
     """
     states, levels = planned
     by_rule = _rule(problem, ahead, parameters, (states[0], most, on))
-    cost, heat = _bought(problem, ahead, *by_rule, None)
+    cost, heat = _bought(problem, ahead, *by_rule)
     left = problem.model.sign * float(problem.model.box.capacity @ (states[-1] - by_rule[0][-1]))
     stored = left * cost / heat if heat > 0.0 else 0.0
     return RuleEstimate(_bought(problem, ahead, states, levels, water)[0], cost, stored)
@@ -90,7 +90,7 @@ def _rule(
 
 
 def _bought(
-    problem: IdentifiedProblem, ahead: Ahead, states: FloatArray, levels: FloatArray, water: FloatArray | None
+    problem: IdentifiedProblem, ahead: Ahead, states: FloatArray, levels: FloatArray, water: FloatArray | None = None
 ) -> tuple[float, float]:
     """Cost [currency] and heat [J] of levels along states, or what is taken where machines cool."""
     model = problem.model

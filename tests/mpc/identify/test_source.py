@@ -242,7 +242,7 @@ def test_what_is_bought_is_paid_at_its_own_price(kind: str) -> None:
     with_meter = _controller(model, Electric(demand=1.0))
     data = with_meter._problem.data(
         np.concatenate([np.full(16, 0.5), np.zeros(4)]), ahead, np.zeros((n, 4)), 10.0,
-        (np.zeros((n, 4)), np.ones((n, 4))), ElectricNow(np.zeros(n)), levels.mean(axis=1),
+        (np.zeros((n, 4)), np.ones((n, 4))), ElectricNow(np.zeros(n)), levels,
     )  # fmt: skip
     whole = np.column_stack([levels, np.zeros((n, with_meter._problem.decisions - 4))])
     after = with_meter._problem.stage.follow(data, whole)
