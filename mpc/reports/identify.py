@@ -12,6 +12,7 @@ from mpc.identify.identify import Identified
 from mpc.identify.maps import MachineMap
 from mpc.identify.model import FILE, PlantModel
 from mpc.identify.source import Source
+from mpc.identify.water import SupplyWater
 from mpc.kpi.kpis import Kpis, measure_kpis
 from mpc.reports.display import write_results
 from mpc.reports.figures.identify import course_pictures, error_pictures, map_pictures
@@ -25,6 +26,7 @@ _TERMS = {
     "standing outdoor": "at any speed above zero, outdoor air 10 K warmer",
     "outdoor": "times the load, outdoor air 10 K warmer", "emitter": "times the load, floor 10 K warmer",
     "command^2 outdoor": "times the load squared, outdoor air 10 K warmer",
+    "water": "times the load, water 10 K warmer", "stored": "while the water becomes 10 K warmer in a step",
 }  # fmt: skip
 _OPERATION = {
     "duty": "run at full load or not at all",
@@ -123,6 +125,10 @@ def identify_summary(found: Identified, made: Experiment | None) -> dict[str, An
             "half_over_full": found.model.source.dearer, "outdoor": found.model.source.outdoor,
             "terms": [_told(row) for row in _source_terms(found.model.source)],
         },
+        "water": None if found.model.water is None else {
+            "actuator": found.model.water.actuator.name, "temperature": found.model.water.temperature,
+            "dearer_by_kelvin": _dearer(found.model), "terms": [_told(row) for row in _water_terms(found.model.water)],
+        },
         "time_constants_hours": (box.time_constants / 3600.0).tolist(), "heat_loss": box.heat_loss.tolist(),
         "unmeasured_heat": box.disturbance.to_dict(), "notes": list(found.notes),
         "experiment": None if made is None else {
@@ -163,6 +169,9 @@ def identify_verdict(found: Identified, made: Experiment | None) -> str:
     if found.model.source is not None:
         text += f"One source feeds them all: at half load its heat takes {percent(found.model.source.dearer - 1.0)} "
         text += "more than at full load. "
+    if found.model.water is not None:
+        text += f"{found.model.water.actuator.name} is decided too: at full load a kelvin of it is worth "
+        text += f"{100.0 * _dearer(found.model):.1f} % of what is bought. "
     if made is not None:
         k = experiment_kpis(made)
         text += (
@@ -216,6 +225,7 @@ def map_rows(model: PlantModel) -> list[list[str]]:
     """
     rows = [row for m in model.maps for row in _terms(m)]
     rows += _source_terms(model.source) if model.source is not None else []
+    rows += _water_terms(model.water) if model.water is not None else []
     return [
         [name, what, term, f"{spell(value, ',.0f')} W", f"{spell(low, ',.0f')} to {spell(high, ',.0f')} W"]
         for name, what, term, value, (low, high) in rows
@@ -237,6 +247,20 @@ def _source_terms(source: Source) -> list[_Term]:
     return _terms_of("one source of all", source.powers)
 
 
+def _water_terms(water: SupplyWater) -> list[_Term]:
+    """List the coefficients of supply water."""
+    return _terms_of(water.actuator.name, water.powers)
+
+
+def _dearer(model: PlantModel) -> float:
+    """Share of what is bought at full load that a kelvin of supply water is worth [-]."""
+    if model.water is None:
+        return 0.0
+    full, outdoor = np.ones(len(model.maps)), OUTDOOR if model.source is None else model.source.outdoor
+    bought = model.bought(np.zeros(model.box.capacity.size), full, outdoor, model.water.temperature)
+    return float(model.water.by_kelvin.sum() / bought.sum())
+
+
 def _terms_of(name: str, curves: Mapping[str, Curve]) -> list[_Term]:
     return [
         (name, what.replace("_", " "), _TERMS[term], value, interval_of(curve, term))
@@ -255,6 +279,12 @@ def _source_words(source: Source) -> str:
     return (
         f"Those of the source at {source.outdoor - 273.15:.0f} °C; below a load of {source.least:g} it goes on and off."
     )
+
+
+def _water_words(water: SupplyWater) -> str:
+    """Say at which water the coefficients are, and what cools."""
+    colder = "" if water.sign > 0.0 else ", of which colder is dearer"
+    return f"All are those with water of {water.temperature - 273.15:.0f} °C{colder}."
 
 
 def _weather(outdoor: float, emitter: float) -> str:
@@ -293,5 +323,6 @@ def _content(found: Identified, made: Experiment | None, command: str) -> dict[s
         "lasting": significant(disturbance.time_constant / 3600.0, 2),
         "at": _weather(*found.model.maps[0].rating), "coefficients_at": _weather(OUTDOOR, EMITTER),
         "source": None if found.model.source is None else _source_words(found.model.source),
+        "water": None if found.model.water is None else _water_words(found.model.water),
         "error_pictures": error_pictures(found), "map_pictures": map_pictures(found), "course": course_pictures(found),
     }  # fmt: skip

@@ -16,11 +16,17 @@ import yaml
 
 from mpc.adapters.described.load import load_plant
 from mpc.errors import ControlError
+from mpc.identify.curves import EMITTER
+from mpc.identify.excitation import ExcitationSettings
 from mpc.identify.machines import Machine, find_machines
+from mpc.identify.regression import Loads
+from mpc.identify.water import find_water
 from mpc.loop.actuators import Actuator
 from mpc.loop.plant import Measurements, PointLayout
 from mpc.loop.run import run_closed_loop
 from mpc.scenario.forecast import Forecast
+from mpc.studies.described import PlantStudy
+from mpc.studies.excited import experiment_period, run_experiment
 from thermal.case.points import HEATING_POWER, ZONE_TEMPERATURE
 
 _WITHOUT = importlib.util.find_spec("pyenergyplus") is None
@@ -223,6 +229,30 @@ def test_every_setpoint_of_cooling_reaches_its_machine(made: Callable[..., Any],
         room = f"{column.rpartition('/')[0]}/{ZONE_TEMPERATURE}"
         assert with_own[room].iloc[50] == pytest.approx(297.15, abs=0.05)  # its own clock holds 24 degC
         assert acted[room].iloc[-1] < with_own[room].iloc[-1] - 1.0
+
+
+@pytest.mark.long
+@needs_energyplus
+def test_what_a_kelvin_of_supply_water_is_worth_is_that_of_the_machines_law(
+    models: Callable[[str], ModuleType], tmp_path: Path
+) -> None:
+    """Of Carnot between water and outdoor air, without the share that is drawn at any load."""
+    path, office = models("plants").write_plant("office", tmp_path), models("office")
+    study = PlantStudy(path, None, *experiment_period(path, None, 7))
+    made = run_experiment(study, 7, ExcitationSettings())
+    level = np.column_stack([machine.level(made.telemetry) for machine in made.machines])
+    loads = Loads(level, made.telemetry.outdoor, np.full(level.shape, EMITTER))
+    found = find_water(made.telemetry, made.machines, loads, {"electricity": made.telemetry.column("electricity")})
+    assert found is not None
+    (rated_water, rated_air), share = office.MACHINE.at[0], 1.0 - office.MACHINE.standing
+    air, water = float(np.mean(loads.outdoor)) - 273.15, found.temperature - 273.15
+    per_heat = models("heat_pump")._per_heat
+    slope = (per_heat(water + 5.0, air) - per_heat(water - 5.0, air)) / per_heat(rated_water, rated_air)
+    heat = sum(machine.full(made.telemetry) for machine in made.machines)
+    curve = found.powers["electricity"]
+    assert curve.coefficients["water"] == pytest.approx(heat * share * slope / office.MACHINE.cop, rel=0.2)
+    own = found.of_plant(np.array([263.15, 288.15])) - 273.15  # its reset: 45 degC at -10, 35 at 15
+    np.testing.assert_allclose(own, [45.0, 35.0], atol=1.5)
 
 
 @pytest.mark.long

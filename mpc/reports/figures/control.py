@@ -116,9 +116,10 @@ def _setpoints(axes: Axes, run: ControlRun) -> None:
 
 
 def _values_set(axes: Axes, run: ControlRun, x: FloatArray) -> None:
-    """Draw whatever was set of a described plant: setpoints on the left, commands on the right."""
-    warm = [name for name in run.loop.actions if str(name).endswith("setpoint")]
-    others = [name for name in run.loop.actions if name not in warm]
+    """Draw whatever was set of a described plant: setpoints on the left, commands or supply water on the right."""
+    wet = [name for name in run.loop.actions if str(name).endswith(_SUPPLY_WATER)]
+    warm = [name for name in run.loop.actions if str(name).endswith("setpoint") and name not in wet]
+    others = [name for name in run.loop.actions if name not in warm and name not in wet]
     for column, colour in zip(warm, (MEASURED, _GREEN, _PINK, _YELLOW), strict=False):
         axes.step(x, run.loop.actions[column] - CELSIUS, where="pre", color=colour, linewidth=1.2, label=column)
     axes.set(title="What was set", ylabel="[°C]" if warm else "")
@@ -127,6 +128,10 @@ def _values_set(axes: Axes, run: ControlRun, x: FloatArray) -> None:
         drawn.step(x, run.loop.actions[column], where="pre", color=colour, linewidth=1.2, label=column)
     if others and not warm:
         axes.set_ylabel("command [-]")
+    if wet and not others:
+        drawn = _right(axes, "supply water [°C]", SIMULATED, "supply water")
+        for column in wet:
+            drawn.step(x, run.loop.actions[column] - CELSIUS, where="pre", color=SIMULATED, linewidth=1.2)
 
 
 def _actions(run: ControlRun, kind: str) -> pd.DataFrame:

@@ -267,3 +267,21 @@ def test_an_experiment_moves_the_water_and_gives_it_back_near_the_edge(sign: flo
     assert NAME not in moved.step(near, Forecast(table.iloc[1500:1548]))
     back = [NAME in moved.step(warm, Forecast(table.iloc[1501 : 1501 + 48])) for _ in range(3)]
     assert not any(back)
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.3])
+def test_radiators_get_what_is_planned_too(exponent: float) -> None:
+    """Of EN 442: in proportion to a power of the difference, of which a reading with cold water says too little."""
+    led, zone, outdoor = Thermostats(model_of()), np.full(2, 293.15), np.full(1, 275.0)
+    short = []
+    for k in range(40):
+        plan = np.array([0.3, 0.6]) + 0.2 * np.sin(k / 4.0)
+        water = float(led.tell_water(plan, outdoor, zone)[NAME])
+        has = ((water - 293.15) / 30.0) ** exponent
+        given = np.minimum(plan, has)
+        for room in range(2):  # out of reach where not all is given that is wanted
+            led.tell(room, float(plan[room]), 2.0, np.full((1, 2), 293.15 + 2.0 * (given[room] < plan[room])),
+                     (292.15, 299.15))  # fmt: skip
+        led.learn(seen_of(1.0, zone, given * FULL, 275.0, water), zone, 275.0)
+        short.append((plan - given).max())
+    assert max(short[20:]) < 0.05 and np.mean(short[20:]) < 0.02
