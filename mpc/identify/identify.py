@@ -19,7 +19,8 @@ from mpc.identify.regression import Loads
 from mpc.identify.shared import out_of_reach, shared_of
 from mpc.identify.source import find_source
 from mpc.identify.telemetry import CARRIERS, SET, PlantTelemetry
-from mpc.identify.water import find_water, told_water
+from mpc.identify.water import SupplyWater
+from mpc.identify.water_regression import WaterCourse, decided_water, find_water
 from thermal._types import FloatArray
 from thermal.case.points import ZONE_TEMPERATURE
 
@@ -100,11 +101,11 @@ def identify(telemetry: PlantTelemetry, machines: Sequence[Machine], progress: P
     own = [telemetry.column(m.power) if m.power and m.meter else None for m in machines]
     above = _above(telemetry, machines)
     per_day = round(86_400.0 / telemetry.step)
-    water, reached = find_water(telemetry, machines, loads, bought), None
-    if water is not None:
-        measured = telemetry.column(water.sensor)
-        reached = water.reached(loads.level, measured[:, None], _air(telemetry, machines))
-        part = water.bought(np.nan_to_num(loads.level), measured).sum(axis=1) + water.stored(measured)
+    course = WaterCourse.of(telemetry, machines)
+    water = None if course is None else find_water(course, telemetry, machines, loads, bought)
+    reached = loads.level if course is None else _reached(course, water, telemetry, machines, loads)
+    if course is not None and water is not None:
+        part = water.bought(loads.level, course.water).sum(axis=1) + water.stored(course.water)
         bought = {kind: values - part[:, CARRIERS.index(kind)] for kind, values in bought.items()}
     maps, base = map_machines(machines, loads, signals, bought, above, per_day, own, reached)
     source, left = find_source(loads, bought, maps, per_day)
@@ -114,14 +115,15 @@ def identify(telemetry: PlantTelemetry, machines: Sequence[Machine], progress: P
     sign, law = machines[0].sign, np.array([found.above[1] for found in maps])
     alone, wanted = [pairs_as_heated(found.limits, sign) for found in maps], out_of_reach(above, law)
     outdoor = as_heated(loads.outdoor, sign)
-    if water is not None:  # cold water is no limit of its source
-        wanted &= water.missed(told_water(telemetry, water.actuator.name), telemetry.column(water.sensor))[:, None]
+    if course is not None:  # cold water is no limit of its source
+        lacks = ~course.moved if water is None else water.missed(course.setpoint, course.water)
+        wanted &= lacks[:, None]
     whole = float(np.maximum(led_heat(maps), 0.0).sum())
     sheet = tuple((at, heat / whole) for at, heat in telemetry.site.capacity)
     held_back = shared_of(
         led_heat(maps), telemetry.step, outdoor, loads.level, wanted, alone, pairs_as_heated(sheet, sign)
     )
-    notes = _notes(telemetry, machines, suns)
+    notes = _notes(telemetry, machines, suns) + _water_notes(telemetry, machines, course, water)
     shared = pairs_as_heated(held_back, sign)
     model = PlantModel(telemetry.site.name, telemetry.step, box, maps, base | left, shared, source, sheet, water)
     return Identified(model, telemetry, data, loads, tuple(errors), split, notes)
@@ -157,9 +159,30 @@ def _loads(telemetry: PlantTelemetry, machines: Sequence[Machine], data: GreyBox
     return Loads(level, data.outdoor, emitter)
 
 
-def _air(telemetry: PlantTelemetry, machines: Sequence[Machine]) -> FloatArray:
-    """Air of the machines' zones, shape (n_time, n_machine) [K]."""
-    return np.column_stack([telemetry.column(f"{machine.serves[0]}/{ZONE_TEMPERATURE}") for machine in machines])
+def _reached(
+    course: WaterCourse, water: SupplyWater | None, telemetry: PlantTelemetry, machines: Sequence[Machine], loads: Loads
+) -> FloatArray:
+    """Give loads that tell what terminals have, with the hottest water or the plant's own; NaN where none does."""
+    if water is None:
+        return np.where(course.moved[:, None], np.nan, loads.level)
+    names = [f"{machine.serves[0]}/{ZONE_TEMPERATURE}" for machine in machines]
+    air = np.column_stack([telemetry.bridged(telemetry.frame[name], np.nan) for name in names])
+    lately = course.lately(telemetry.step, water.sign)
+    return water.reached(loads.level, course.water[:, None], air, lately[:, None])
+
+
+def _water_notes(
+    telemetry: PlantTelemetry, machines: Sequence[Machine], course: WaterCourse | None, water: SupplyWater | None
+) -> tuple[str, ...]:
+    """Say why supply water that could be decided is left to the plant."""
+    setpoint = telemetry.site.water
+    if setpoint is None or water is not None:
+        return ()
+    why = "no setpoints of all zones with heat meters are controlled"
+    if course is not None and decided_water(telemetry.site, machines) is not None:
+        why = f"it was told in {course.moved.mean():.0%} of the steps, which does not tell that hotter water costs more"
+        why = why if machines[0].sign > 0.0 else why.replace("hotter", "colder")
+    return (f"{setpoint.name} is left to the plant: {why}",)
 
 
 def _above(telemetry: PlantTelemetry, machines: Sequence[Machine]) -> FloatArray:

@@ -193,7 +193,7 @@ def map_machines(
     everyone = range(len(machines))
     stops = [bool((loads.level[:, m] <= IDLE).any()) for m in everyone]
     heats = [regress(loads, signals[:, m], [m], base=stops[m])[0][0] for m in everyone]
-    moves = {kind: values for kind, values in bought.items() if np.ptp(values) > 1.0}
+    moves = {kind: values for kind, values in bought.items() if np.nanmax(values) - np.nanmin(values) > 1.0}
     powers = {kind: regress_power(loads, values, everyone, per_day) for kind, values in moves.items()}
     made = []
     for m, machine in enumerate(machines):
@@ -202,7 +202,7 @@ def map_machines(
             made.append(replace(found, operation=_operation(found)))
         else:
             level, over = loads.level[:, m], above[:, m]
-            gave = level if reached is None else reached[:, m]
+            gave = level if reached is None else reached[:, m]  # largest loads are those with the hottest water
             limits = limits_of(as_heated(loads.outdoor, machine.sign), gave, over)
             made.append(replace(found, above=_local(level, over), limits=pairs_as_heated(limits, machine.sign)))
     made = [

@@ -239,7 +239,7 @@ def _water_of(entry: Mapping[str, Any] | None) -> SupplyWater | None:
     curves = {kind: Curve(**curve) for kind, curve in entry["powers"].items()}
     shares, (level, slope) = tuple(float(share) for share in entry["shares"]), entry["own"]
     of = Actuator(**entry["actuator"]), float(entry["sign"]), shares, curves, float(entry["temperature"])
-    return SupplyWater(*of, (float(level), float(slope)))
+    return SupplyWater(*of, (float(level), float(slope)), float(entry["hottest"]), float(entry["below"]))
 
 
 def read_model(folder: Path) -> PlantModel:

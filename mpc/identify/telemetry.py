@@ -104,17 +104,19 @@ class PlantTelemetry:
         """
         return self.bridged(self.frame[name]) if name in self.frame else np.zeros(len(self.frame))
 
-    def bridged(self, values: pd.Series) -> FloatArray:
-        """Bridge short gaps by straight lines, and fill others with zeros, shape (n_time,).
+    def bridged(self, values: pd.Series, beyond: float = 0.0) -> FloatArray:
+        """Bridge short gaps by straight lines, and fill others, with zeros by default, shape (n_time,).
 
         Parameters
         ----------
         values : Series, shape (n_time,)
             On the steps [any unit].
+        beyond : float
+            Of longer gaps, such as NaN [the same unit].
         """
         limit = max(round(_BRIDGED / self.step), 1)
         filled = values.astype(float).interpolate(limit=limit, limit_direction="both")
-        return np.asarray(filled.fillna(0.0), dtype=float)
+        return np.asarray(filled.fillna(beyond), dtype=float)
 
     @property
     def weather(self) -> pd.DataFrame:

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from mpc.errors import PlantError
-from mpc.identify.curves import OUTDOOR, PER, Curve, interval_of
+from mpc.identify.curves import OUTDOOR, PER, Curve
 from mpc.identify.limits import RUNS
-from mpc.identify.machines import Machine, as_heated
-from mpc.identify.regression import Loads, curve_of, design_of, least_squares, left_out_error
-from mpc.identify.source import LEAST, source_design
-from mpc.identify.telemetry import CARRIERS, SET, PlantTelemetry
+from mpc.identify.machines import as_heated
+from mpc.identify.telemetry import CARRIERS
 from mpc.loop.actuators import Actuator
 from thermal._types import BoolArray, FloatArray
 
 #: What is regressed on beside the loads: their sum times the water's temperature over 10 K, and by how much warmer the
 #: water has become in a step, over 10 K: a loop stores heat (the office's in 10 K that of 13 min of its heat pump).
-_WATER, _STORED = "water", "stored"
+WATER, STORED = "water", "stored"
 
 #: Share of the full load that water is kept hotter for than planned [-]: what model and forecast have wrong, zones'
 #: own controllers ask for within a step.
@@ -29,8 +26,15 @@ _MARGIN = 0.1
 #: Least share of the way from a zone's air to the hottest water at which a load says what that would give [-].
 _TELLS = 0.2
 
-#: How far water stays below its setpoint where its source gives all that it can [K].
-_MISSED = 1.0
+#: Share of the way of the hottest water of the last hour below which what a terminal gives is not yet that of its water
+#: [-]: radiators give heat late.
+_STEADY = 0.9
+
+#: How much farther below its setpoint than usual water stays where its source gives all that it can [K].
+_MISSED = 2.0
+
+#: Least difference of the hottest water and a zone's air that is counted with [K].
+_APART = 1.0
 
 #: How far the corner is rounded at which terminals ask for hotter water than the coldest [K].
 _ROUND = 1.0
@@ -66,6 +70,10 @@ class SupplyWater:
         T, the mean of the telemetry by load [K].
     own : tuple of float
         Setpoint that the plant itself has at 7 degC outdoors [K], and what it has more for a kelvin outdoors [K/K].
+    hottest : float
+        Hottest water, that largest loads are told with: where it was identified, whatever the plant's range is now [K].
+    below : float
+        How far water usually lies below its setpoint, above it where it cools, as sensors and controllers have it [K].
     """
 
     actuator: Actuator
@@ -74,6 +82,8 @@ class SupplyWater:
     powers: Mapping[str, Curve]
     temperature: float
     own: tuple[float, float]
+    hottest: float
+    below: float = 0.0
 
     @property
     def sensor(self) -> str:
@@ -86,8 +96,12 @@ class SupplyWater:
         low, high = sorted(as_heated(end, self.sign) for end in (self.actuator.lowest, self.actuator.highest))
         return low, high
 
-    def reached(self, load: FloatArray, water: FloatArray | float, air: FloatArray) -> FloatArray:
+    def reached(
+        self, load: FloatArray, water: FloatArray | float, air: FloatArray, lately: FloatArray | float
+    ) -> FloatArray:
         """Tell what the hottest water would have given where a terminal gave all that it has, as loads [-].
+
+        NaN where water is too near to the air to tell, or was much hotter within the hour.
 
         Parameters
         ----------
@@ -97,13 +111,31 @@ class SupplyWater:
             Measured supply [K].
         air : ndarray, shape (..., n_machine)
             Of the machines' zones [K].
+        lately : ndarray or float
+            Hottest supply of the last hour, the coldest where it cools [K].
         """
-        return np.asarray(load / np.maximum(self._way(water, air), _TELLS))
+        way, before = self._way(water, air), self._way(lately, air)
+        tells = (way >= _TELLS) & (way >= _STEADY * before)
+        return np.where(tells, load / np.maximum(way, _TELLS), np.nan)
 
     def _way(self, water: FloatArray | float, air: FloatArray) -> FloatArray:
         """Share of the way from the air to the hottest water [-]."""
-        cold, hot = as_heated(air, self.sign), self.ends[1]
-        return np.asarray((as_heated(water, self.sign) - cold) / (hot - cold))
+        cold = as_heated(air, self.sign)
+        return np.asarray((as_heated(water, self.sign) - cold) / self._whole(cold))
+
+    def _whole(self, cold: FloatArray) -> FloatArray:
+        """Way from the air to the hottest water [K]."""
+        return np.asarray(np.maximum(as_heated(self.hottest, self.sign) - cold, _APART))
+
+    def share(self, air: FloatArray) -> FloatArray:
+        """Tell what part of the largest loads the plant's own range of water leaves, shape (n_machine,) [-].
+
+        Parameters
+        ----------
+        air : ndarray, shape (n_machine,)
+            Of the machines' zones [K].
+        """
+        return np.clip(self._way(float(as_heated(self.ends[1], self.sign)), air), 0.0, 1.0)
 
     def missed(self, told: FloatArray | float, water: FloatArray | float) -> BoolArray:
         """Tell where the source cannot hold the water.
@@ -113,7 +145,7 @@ class SupplyWater:
         told, water : ndarray or float
             Setpoint and measured supply [K].
         """
-        return np.asarray(as_heated(told, self.sign) - as_heated(water, self.sign) > _MISSED)
+        return np.asarray(as_heated(told, self.sign) - as_heated(water, self.sign) > self.below + _MISSED)
 
     def needed(self, loads: FloatArray, most: FloatArray, air: FloatArray) -> FloatArray:
         """Choose the coldest water that gives loads and a tenth of the largest more, shape (...) [K].
@@ -125,14 +157,11 @@ class SupplyWater:
         air : ndarray, shape (n_machine,)
             Of the machines' zones [K].
         """
-        ask, cold = self._ask(loads, most), as_heated(air, self.sign)
-        low, hot = self.ends
-        wanted = cold + np.minimum(ask, 1.0) * (hot - cold)
+        ask, cold = loads / np.maximum(most, _NOTHING) + _MARGIN, as_heated(air, self.sign)
+        low, high = self.ends
+        wanted = cold + np.minimum(ask, 1.0) * self._whole(cold)
         wanted = np.where(np.asarray(loads) > RUNS * _MARGIN, wanted, low).max(axis=-1)
-        return np.asarray(as_heated(np.clip(wanted, low, hot), self.sign))
-
-    def _ask(self, loads: FloatArray, most: FloatArray) -> FloatArray:
-        return np.asarray(loads / np.maximum(most, _NOTHING) + _MARGIN)
+        return np.asarray(as_heated(np.clip(wanted, low, high), self.sign))
 
     def bought(self, loads: FloatArray, water: FloatArray | float) -> FloatArray:
         """Power by machine and kind beyond that of water at `temperature`, shape (..., n_machine, n_carrier) [W].
@@ -145,7 +174,7 @@ class SupplyWater:
             Supply [K].
         """
         hotter = self._hotter(as_heated(water, self.sign))
-        return np.asarray((loads * self.shares * hotter[..., None])[..., None] * self._by(_WATER))
+        return np.asarray((loads * self.shares * hotter[..., None])[..., None] * self._by(WATER))
 
     def of_plant(self, outdoor: FloatArray | float) -> FloatArray:
         """Give the water of the plant's own control, shape (...) [K].
@@ -166,7 +195,7 @@ class SupplyWater:
         water : ndarray, shape (n_time,)
             Measured supply [K].
         """
-        return _stored(water, self.sign)[:, None] * self._by(_STORED)
+        return stored(water, self.sign)[:, None] * self._by(STORED)
 
     def _hotter(self, water: FloatArray | float) -> FloatArray:
         return np.asarray((water - as_heated(self.temperature, self.sign)) / PER)
@@ -174,7 +203,7 @@ class SupplyWater:
     @property
     def by_kelvin(self) -> FloatArray:
         """What a kelvin of all terminals' full load costs of each of `CARRIERS`, shape (n_carrier,) [W/K]."""
-        return self._by(_WATER) / PER
+        return self._by(WATER) / PER
 
     def _by(self, feature: str) -> FloatArray:
         """Coefficient of each of `CARRIERS`, shape (n_carrier,) [W]."""
@@ -192,8 +221,9 @@ class SupplyWater:
         air : ndarray, shape (n_machine,)
             Of the machines' zones [K].
         """
-        (low, hot), cold = self.ends, float(as_heated(air, self.sign) @ np.array(self.shares))
-        line = np.tile([cold + _MARGIN * (hot - cold) - low, hot - cold, 1.0], (len(most), 1))
+        cold = float(as_heated(air, self.sign) @ np.array(self.shares))
+        whole = float(self._whole(np.array(cold)))
+        line = np.tile([cold + _MARGIN * whole - self.ends[0], whole, 1.0], (len(most), 1))
         if planned is not None:
             shares = np.array(self.shares)
             above = np.maximum(line[:, :1] + line[:, 1:2] * planned / most, 0.0)
@@ -241,90 +271,14 @@ def sensor_of(setpoint: str) -> str:
     return setpoint.removesuffix("setpoint") + "sensor"
 
 
-def find_water(
-    telemetry: PlantTelemetry, machines: Sequence[Machine], loads: Loads, bought: Mapping[str, FloatArray]
-) -> SupplyWater | None:
-    """Find what a kelvin of the supply water costs; None where nothing is to be decided, or hotter water costs no more.
+def stored(water: FloatArray, sign: float) -> FloatArray:
+    """By how much water has become warmer in each step, colder where it cools, over 10 K, shape (n_time,) [-].
 
     Parameters
     ----------
-    telemetry : PlantTelemetry
-        In which the water's setpoint was moved.
-    machines : sequence of Machine
-        Terminals.
-    loads : Loads
-        Of the machines [-].
-    bought : mapping of str to ndarray
-        Power of each kind that the plant buys, shape (n_time,) [W].
-
-    Raises
-    ------
-    PlantError
-        When the water is not measured, or a machine is no setpoint of a zone whose heat has a meter.
+    water : ndarray, shape (n_time,)
+        Supply [K].
+    sign : float
+        As of `SupplyWater` [-].
     """
-    actuator = telemetry.site.water
-    if actuator is None:
-        return None
-    sensor, sign = sensor_of(actuator.name), machines[0].sign
-    PlantError.unless(
-        sensor in telemetry.frame, f"telemetry: {sensor}", "the temperature of the source's water", "none",
-        f"add it to `measurements`, or leave {actuator.name} out of `source`",
-    )  # fmt: skip
-    others = [machine.name for machine in machines if machine.role != "setpoint" or not machine.heat]
-    PlantError.unless(
-        not others, f"source: {actuator.name}", "setpoints of zones whose heat has a meter", ", ".join(others),
-        "leave it out of `source`, and the plant's own control has the water",
-    )  # fmt: skip
-    full = np.array([machine.full(telemetry) for machine in machines])
-    water = telemetry.column(sensor)
-    total = loads.level @ (full / full.sum())
-    rows = loads.known & np.isfinite(total)
-    middle = float(np.average(water[rows], weights=total[rows]))
-    hotter = (as_heated(water, sign) - as_heated(middle, sign)) / PER
-    beyond, per_day = loads.outdoor - float(np.median(loads.outdoor)), round(86_400.0 / telemetry.step)
-    designs = [source_design(total[:, None], np.ones(1), beyond, least) for least in LEAST]
-    designs.append(design_of(loads, range(len(machines))))
-    powers = {}
-    for kind, values in bought.items():
-        told = [np.column_stack([design, _stored(water, sign), total * hotter]) for design in designs]
-        design = min(told, key=lambda columns: left_out_error(columns, values, per_day))
-        seen = rows & np.isfinite(values)
-        found, deviations = least_squares(design[seen], values[seen])
-        powers[kind] = curve_of([*[""] * (design.shape[1] - 2), _STORED, _WATER], found, deviations)
-    powers = {kind: curve for kind, curve in powers.items() if interval_of(curve, _WATER)[0] > 0.0}
-    if not powers:
-        return None
-    own = _own(telemetry, actuator.name, middle)
-    return SupplyWater(actuator, sign, tuple((full / full.sum()).tolist()), powers, middle, own)
-
-
-def _stored(water: FloatArray, sign: float) -> FloatArray:
-    """By how much water has become warmer in each step, colder where it cools, over 10 K, shape (n_time,) [-]."""
     return np.asarray(sign * np.diff(water, prepend=water[:1]) / PER)
-
-
-def told_water(telemetry: PlantTelemetry, name: str) -> FloatArray:
-    """Setpoint of the water as it was told, else as the plant has it, shape (n_time,) [K]; NaN where nothing says it.
-
-    Parameters
-    ----------
-    telemetry : PlantTelemetry
-        Of the plant.
-    name : str
-        Of the actuator.
-    """
-    nothing = np.full(len(telemetry.frame), np.nan)
-    told, has = (telemetry.frame[c].to_numpy(dtype=float) if c in telemetry.frame else nothing
-                 for c in (f"{SET}{name}", name))  # fmt: skip
-    return np.where(np.isfinite(told), told, has)
-
-
-def _own(telemetry: PlantTelemetry, name: str, middle: float) -> tuple[float, float]:
-    """Setpoint of the plant itself over outdoor air: a line through the steps in which it had the water."""
-    has = telemetry.frame[name].to_numpy(dtype=float) if name in telemetry.frame else telemetry.column(sensor_of(name))
-    told = telemetry.frame.get(f"{SET}{name}")
-    free = np.isfinite(has) & (True if told is None else told.isna().to_numpy())
-    if free.sum() < 8:
-        return middle, 0.0
-    slope, level = np.polyfit(telemetry.outdoor[free] - OUTDOOR, has[free], 1)
-    return float(level), float(slope)

@@ -18,11 +18,12 @@ from mpc.control.identified.controller import IdentifiedController
 from mpc.errors import ControlError, LiveError, MpcError
 from mpc.identify.machines import find_machines
 from mpc.identify.model import read_model
+from mpc.identify.water import sensor_of
 from mpc.live.building import BuildingController, building_controller
 from mpc.live.past import past_table
 from mpc.live.site import Site
 from mpc.live.site_file import BuildingModel
-from mpc.loop.actuators import Actuator
+from mpc.loop.actuators import SUPPLY_WATER, Actuator
 from mpc.loop.plant import Controller, Measurements, PointLayout
 from mpc.scenario.forecast import Forecast
 from thermal.case.points import OUTDOOR_TEMPERATURE
@@ -211,4 +212,5 @@ def needed_columns(site: Site, controller: Controller) -> tuple[str, ...]:
         return tuple(name for name in controller.columns if name in site.file.points)
     zones = {f"{zone}/zone_air_temperature_sensor" for zone in site.plant.zones}
     kept = [name for name in site.file.points if name not in site.plant.actuators]
-    return tuple(name for name in kept if name in zones or name.endswith(OUTDOOR_TEMPERATURE) or "power" in name)
+    inputs = OUTDOOR_TEMPERATURE, "power", sensor_of(SUPPLY_WATER)
+    return tuple(name for name in kept if name in zones or any(point in name for point in inputs))

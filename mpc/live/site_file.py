@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from mpc.adapters.described.schema import Kelvin
+from mpc.adapters.described.values import Kelvin
 from thermal.case.building import Entry, Number, Positive, Text
 
 #: What is done with a plan's value of a point: it is kept, shown for a click, or written.

@@ -256,7 +256,7 @@ def _dearer(model: PlantModel) -> float:
     """Share of what is bought at full load that a kelvin of supply water is worth [-]."""
     if model.water is None:
         return 0.0
-    full, outdoor = np.ones(len(model.maps)), OUTDOOR if model.source is None else model.source.outdoor
+    full, outdoor = np.ones(len(model.maps)), model.maps[0].rating[0] if model.source is None else model.source.outdoor
     bought = model.bought(np.zeros(model.box.capacity.size), full, outdoor, model.water.temperature)
     return float(model.water.by_kelvin.sum() / bought.sum())
 

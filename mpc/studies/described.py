@@ -23,7 +23,7 @@ from mpc.errors import ControlError, PlantError
 from mpc.identify.machines import Machine, check_terminals, find_machines
 from mpc.identify.model import PlantModel
 from mpc.identify.telemetry import SET, PlantTelemetry, Site
-from mpc.loop.actuators import Actuator
+from mpc.loop.actuators import COOLING_SETPOINT, Actuator
 from mpc.scenario.scenario import Scenario
 from mpc.studies.electric import electric_of
 
@@ -93,9 +93,16 @@ class PlantStudy:
         if source is None:
             return Site(file.name, areas, file.location)
         heats, cools = (source.heating, source.heating_water), (source.cooling, source.cooling_water)
-        sheet, name = cools if self.cooling else heats
+        sheet, name = cools if self._cools else heats
         water = None if name is None else described_actuator(name, file.actuators[name])
         return Site(file.name, areas, file.location, sheet, water)
+
+    @property
+    def _cools(self) -> bool:
+        """Whether what is controlled cools."""
+        if self.model is not None:
+            return self.model.sign < 0.0
+        return self.cooling or any(name.endswith(COOLING_SETPOINT) for name in self.actuators)
 
     def plant(self) -> Any:
         """Make the plant, to be reset, and freed by leaving a ``with`` block."""

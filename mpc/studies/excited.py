@@ -14,6 +14,7 @@ from mpc.errors import PlantError
 from mpc.identify.excitation import Excitation, ExcitationSettings
 from mpc.identify.machines import Machine
 from mpc.identify.telemetry import PlantTelemetry, run_recorded
+from mpc.identify.water_regression import decided_water
 from mpc.loop.run import ClosedLoopRun
 from mpc.scenario.scenario import Scenario
 from mpc.studies.described import PlantStudy
@@ -63,7 +64,8 @@ def run_experiment(
     with study.plant() as plant:
         study.steps(plant)  # refuses a plant without forecasts before it runs
         machines = study.machines(plant)
-        excitation = Excitation(machines, plant.control_step, settings, study.site.water)
+        water = decided_water(study.site, machines)
+        excitation = Excitation(machines, plant.control_step, settings, water)
         steps = round(days * 86_400.0 / plant.control_step)
         report = None if progress is None else (lambda done, _: progress("experiment", done, steps))
         run, telemetry = run_recorded(plant, excitation, study.site, steps, report)

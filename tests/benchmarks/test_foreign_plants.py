@@ -20,7 +20,7 @@ from mpc.identify.curves import EMITTER
 from mpc.identify.excitation import ExcitationSettings
 from mpc.identify.machines import Machine, find_machines
 from mpc.identify.regression import Loads
-from mpc.identify.water import find_water
+from mpc.identify.water_regression import WaterCourse, find_water
 from mpc.loop.actuators import Actuator
 from mpc.loop.plant import Measurements, PointLayout
 from mpc.loop.run import run_closed_loop
@@ -242,7 +242,9 @@ def test_what_a_kelvin_of_supply_water_is_worth_is_that_of_the_machines_law(
     made = run_experiment(study, 7, ExcitationSettings())
     level = np.column_stack([machine.level(made.telemetry) for machine in made.machines])
     loads = Loads(level, made.telemetry.outdoor, np.full(level.shape, EMITTER))
-    found = find_water(made.telemetry, made.machines, loads, {"electricity": made.telemetry.column("electricity")})
+    course, bought = WaterCourse.of(made.telemetry, made.machines), made.telemetry.column("electricity")
+    assert course is not None
+    found = find_water(course, made.telemetry, made.machines, loads, {"electricity": bought})
     assert found is not None
     (rated_water, rated_air), share = office.MACHINE.at[0], 1.0 - office.MACHINE.standing
     air, water = float(np.mean(loads.outdoor)) - 273.15, found.temperature - 273.15

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from mpc.adapters.described.schema import Input, PlantFile
+from mpc.adapters.described.schema import PlantFile
+from mpc.adapters.described.values import Input
 from mpc.errors import PlantError
 from mpc.loop.actuators import Actuator
 from mpc.loop.conversion import SIGNAL_UNITS

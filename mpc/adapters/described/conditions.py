@@ -8,8 +8,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from mpc.adapters.described.schema import Comfort, Emissions, Hours, PlantFile, Prices, Signal, Value
+from mpc.adapters.described.schema import Comfort, Emissions, PlantFile, Prices
 from mpc.adapters.described.series import NamedSeries
+from mpc.adapters.described.values import Hours, Signal, Value
 from mpc.errors import PlantError, ScenarioError
 from mpc.loop.conversion import conversion
 from mpc.scenario.forecast import DAY_AHEAD_ERRORS, Forecaster

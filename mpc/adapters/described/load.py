@@ -13,8 +13,9 @@ from mpc.adapters.boptest.scenario import DAY, PRICE_POINTS, YearClock
 from mpc.adapters.described.conditions import SeriesSource, described_forecaster
 from mpc.adapters.described.programs import EnergyPlusProgram, ServerProgram, SiteProgram, UnitProgram
 from mpc.adapters.described.read import place_of, read_description
-from mpc.adapters.described.schema import Period, PlantFile, Value
+from mpc.adapters.described.schema import Period, PlantFile
 from mpc.adapters.described.series import NamedSeries, read_table, run_ahead, unit_period, unit_tables
+from mpc.adapters.described.values import Value
 from mpc.adapters.energyplus.input import building_path, weather_path
 from mpc.adapters.energyplus.signals import EnergyPlusRun, EnergyPlusSignalPlant, EnergyPlusSignals
 from mpc.adapters.fmu.plant import FmuPlant, FmuSignals, FmuTime

@@ -1,142 +1,19 @@
 """What stands in a ``plant.yaml``, as a schema."""
 
-import re
-from itertools import pairwise
 from typing import Annotated, Any, Literal
 
-import numpy as np
-from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, model_validator
+from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from mpc.adapters.described.electric import ElectricEntry
 from mpc.adapters.described.programs import EnergyPlusProgram, ServerProgram, SiteProgram, UnitProgram
+from mpc.adapters.described.values import Acted, DataSheet, Kelvin, Named, Value, kelvin
+from mpc.loop.actuators import SUPPLY_WATER
 from thermal.case.building import Entry, Location, Number, Positive, Text
-from thermal.errors import CaseError
-from thermal.units import to_si
-
-_NUMBER = re.compile(r"\s*[-+]?[0-9.]+(?:[eE][-+]?\d+)?\s*")
-_WITH_UNIT = re.compile(r"\s*([-+]?[0-9.]+(?:[eE][-+]?\d+)?)\s*([A-Za-z°]\S*)\s*")
-
-
-def _kelvin(value: Any) -> Any:
-    """Bring text such as ``21 degC`` into kelvin, in tables of hours too; leave all else."""
-    if isinstance(value, dict | list | tuple):
-        return {k: _kelvin(v) for k, v in value.items()} if isinstance(value, dict) else [_kelvin(v) for v in value]
-    found = _WITH_UNIT.fullmatch(value) if isinstance(value, str) else None
-    if found is None:
-        return value
-    try:
-        return float(to_si(np.array([float(found[1])]), found[2], "temperature")[0])
-    except (CaseError, ValueError) as error:
-        raise ValueError(f"expected a temperature in K, or with its unit such as '21 degC' ({error})") from error
-
-
-def _signal(value: Any) -> Any:
-    """Take a name for a signal without more."""
-    return {"signal": value} if isinstance(value, str) else value
 
 
 def _text(value: Any) -> Any:
     """Take a date or time, as YAML reads it, for its text."""
     return value.isoformat() if hasattr(value, "isoformat") else value
-
-
-def _rising(pairs: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
-    """Refuse a data sheet whose outdoor temperatures do not rise."""
-    outdoor = [pair[0] for pair in pairs]
-    if any(b <= a for a, b in pairwise(outdoor)):
-        raise ValueError(f"expected a capacity over rising outdoor temperatures, found {outdoor} K")
-    return pairs
-
-
-def _branch(value: Any) -> str | None:
-    """Tell a number, a name and a table of hours apart."""
-    if isinstance(value, bool) or (isinstance(value, str) and _NUMBER.fullmatch(value)):  # in quotes by mistake
-        return None
-    kinds = ((float | int, "<number>"), (str, "<name>"), (dict, "<hours>"))
-    return next((tag for kind, tag in kinds if isinstance(value, kind)), None)
-
-
-class Hours(Entry):
-    """Values by the local hour.
-
-    Parameters
-    ----------
-    weekday : tuple of float
-        24 values from midnight on [unit of what they stand for].
-    weekend : tuple of float, optional
-        On Saturdays and Sundays [the same unit]; as on weekdays by default.
-    """
-
-    weekday: Annotated[tuple[Number, ...], Field(min_length=24, max_length=24)]
-    weekend: Annotated[tuple[Number, ...], Field(min_length=24, max_length=24)] | None = None
-
-
-#: A number, the name of a series, or values by the hour.
-Value = Annotated[
-    Annotated[Number, Tag("<number>")] | Annotated[Text, Tag("<name>")] | Annotated[Hours, Tag("<hours>")],
-    Discriminator(
-        _branch, custom_error_type="value",
-        custom_error_message="Input should be a number, the name of a series, or hours (weekday, weekend)",
-    ),
-]  # fmt: skip
-Kelvin = Annotated[Number, BeforeValidator(_kelvin)]
-
-#: Outdoor temperatures, rising, and the most heat at each; on straight lines between them.
-DataSheet = Annotated[tuple[tuple[Kelvin, Positive], ...], AfterValidator(_rising)]
-
-
-class Signal(Entry):
-    """A signal of the program that stands for the building, or a series.
-
-    Parameters
-    ----------
-    signal : str
-        Its name there.
-    unit : str, optional
-        Where the program declares none, or a wrong one.
-    """
-
-    signal: Text
-    unit: Text | None = None
-
-
-Named = Annotated[Signal, BeforeValidator(_signal)]
-
-
-class Input(Signal):
-    """An actuator.
-
-    Parameters
-    ----------
-    signal, unit : str
-        As of `Signal`.
-    range : tuple of float, optional
-        Lowest and highest value [library's unit], or temperatures with their unit; those declared by default.
-    kind : {"continuous", "on_off", "modulating"}
-        Which values of its range it takes; on-off by default where the program says that it is a Boolean.
-    minimum : float, optional
-        Smallest value of a modulating actuator that is not off [library's unit].
-    release : str, optional
-        Input that hands the actuator over while it is 1; ``X_activate`` of ``X_u`` by default where it is there.
-    capacity : tuple of tuple of float
-        Of a setpoint, a data sheet: outdoor temperatures [K], rising, and the most heat that its machine gives at each,
-        or takes where it cools [W].
-    """
-
-    range: tuple[Kelvin, Kelvin] | None = None
-    kind: Literal["continuous", "on_off", "modulating"] | None = None
-    minimum: Number | None = None
-    release: Text | None = None
-    capacity: DataSheet = ()
-
-    @model_validator(mode="after")
-    def _fits(self) -> "Input":
-        if (self.kind == "modulating") != (self.minimum is not None):
-            raise ValueError("expected a minimum of a modulating actuator, and of no other")
-        return self
-
-
-Acted = Annotated[Input, BeforeValidator(_signal)]
 
 
 class SharedSource(Entry):
@@ -171,8 +48,8 @@ class Comfort(Entry):
         Begin and end of the occupied hours, local [h]; a day without is left out.
     """
 
-    lower: Annotated[Value, BeforeValidator(_kelvin)] | None = None
-    upper: Annotated[Value, BeforeValidator(_kelvin)] | None = None
+    lower: Annotated[Value, BeforeValidator(kelvin)] | None = None
+    upper: Annotated[Value, BeforeValidator(kelvin)] | None = None
     occupied: tuple[Kelvin, Kelvin] | None = None
     unoccupied: tuple[Kelvin, Kelvin] | None = None
     weekday: tuple[Number, Number] | None = None
@@ -394,10 +271,11 @@ class PlantFile(Entry):
             name = None if self.source is None else getattr(self.source, key)
             if name is None:
                 continue
-            if not name.endswith("_temperature_setpoint") or name not in self.actuators:
-                raise ValueError(f"expected a temperature setpoint of `actuators` as source.{key}, found {name!r}")
-            if self.actuators[name].range is None:
-                raise ValueError(f"expected a range of {name}, the coldest and the hottest water, found none")
+            if not name.endswith(SUPPLY_WATER) or name not in self.actuators:
+                raise ValueError(f"expected one of `actuators`, ENTITY/{SUPPLY_WATER}, as source.{key}, found {name!r}")
+            told = self.actuators[name]
+            if told.range is None or told.range[0] >= told.range[1] or told.kind not in (None, "continuous"):
+                raise ValueError(f"expected a range of {name} from the coldest to the hottest water, of any value")
             if (sensor := name.removesuffix("setpoint") + "sensor") not in self.measurements:
                 raise ValueError(f"expected the measurement {sensor} beside source.{key}, found none")
         return self

@@ -295,7 +295,7 @@ class IdentifiedController:
         """Fill the problem in, from the state that is estimated; a source counts by its tangents at a plan before."""
         price, state = self.settings.comfort_price, self._observer.state
         planned = None if before is None else before[:, : len(self.model.maps)]
-        most = None if self.model.water is None else self._thermostats.most(ahead.outdoor)
+        most = None if self.model.water is None else self._thermostats.with_hottest(ahead.outdoor)
         return self._problem.data(state, ahead, self._kept, price, ends, self._now, planned, most)
 
     def _solve(self, ahead: Ahead, ends: tuple[FloatArray, FloatArray]) -> StageSolution | None:
@@ -364,6 +364,9 @@ class IdentifiedController:
                 values |= found.machine.told(self._thermostats.tell(k, level, most[k], zone, edges, shared), edges[1])
             else:
                 values[found.machine.name] = command_of(found, level)
+        if solution is None:  # nothing says how hot it has to be: the plant has it
+            self._thermostats.leave_water()
+            return values
         return values | self._thermostats.tell_water(levels, ahead.outdoor[:1], zone[0])
 
     def _edges_of(self, k: int, ahead: Ahead, measurements: Measurements) -> tuple[float, float]:

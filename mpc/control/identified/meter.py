@@ -74,7 +74,7 @@ class ElectricMeter:
         state : ndarray
             Of the observer [K and W].
         """
-        water = None if self.model.water is None else values[self.model.water.actuator.name]
+        water = None if self.model.water is None else values.get(self.model.water.actuator.name)
         self._modelled = bought(self.model, ahead.beyond[0], state, levels, ahead.outdoor[0], water)[:, 0]
         power = 0.0 if self.electric.battery is None else self.electric.battery.power
         base = float(self.model.bought_anyway[0])

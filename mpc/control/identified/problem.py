@@ -191,7 +191,7 @@ class IdentifiedProblem:
         now : ElectricNow, optional
             Of what is electric; none generated, nothing stored and no peak by default.
         planned : ndarray, shape (N, n_machine), optional
-            Loads at which the power of a source is touched, see `Source.lines` and `SupplyWater.curve` [-].
+            Loads at which the power of a source is touched, see `Source.lines` and `SupplyWater.line` [-].
         most : ndarray, shape (N, n_machine), optional
             Largest loads, where the temperature of supply water is decided [-].
         """

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Sequence
+
 import numpy as np
 
 from calibration.estimation.state_space import REFERENCE
@@ -23,6 +26,9 @@ _PUSH = 0.5
 #: nothing makes up for what model and forecast have wrong. Chosen on the office's cold weeks, where zones are 0.18 K h
 #: below their band with it and 0.62 without, for 1.2 % more; the only size that was tried.
 _RESERVE = 0.05
+
+#: Time over which a terminal may still give the heat of hotter water [s].
+_HOUR = 3600.0
 
 
 class Thermostats:
@@ -49,9 +55,23 @@ class Thermostats:
         self._error = ForecastError(model.step)
         self._told, self._zone = np.full(len(model.maps), np.nan), np.full(len(model.box.zones), np.nan)
         self._served, self._water = model.box.serves, np.nan
+        self._supplied = deque[float](maxlen=max(round(_HOUR / model.step), 1) + 1)
 
     def most(self, outdoor: FloatArray) -> FloatArray:
         """Largest loads, shape (N, n_machine) [-]: 1 of machines that are commanded.
+
+        Parameters
+        ----------
+        outdoor : ndarray, shape (N,)
+            Outdoor air that is forecast for the coming steps [K].
+        """
+        most, water = self.with_hottest(outdoor), self._model.water
+        if water is None or not np.isfinite(self._zone).all():
+            return most
+        return np.asarray(most * water.share(self._model.air(as_heated(self._zone, self._sign))))
+
+    def with_hottest(self, outdoor: FloatArray) -> FloatArray:
+        """Largest loads with the hottest water that a model knows, whatever the plant has, shape (N, n_machine) [-].
 
         Parameters
         ----------
@@ -118,9 +138,13 @@ class Thermostats:
         full = np.array([found.above[1] for found in self._model.maps])
         wanted, reached = (loads > _IDLE) & out_of_reach(missing, full), loads
         if (water := self._model.water) is not None:
-            supply = measurements[water.sensor] if water.sensor in measurements else np.nan
-            wanted &= water.missed(self._water, supply)  # cold water is no limit of its source
-            reached = water.reached(loads, supply, self._model.air(zone))
+            # as it is measured, else as the plant has its setpoint, else as it was told
+            has = _first(measurements, (water.actuator.name,), self._water)
+            supply = _first(measurements, (water.sensor,), has)
+            self._supplied.append(float(as_heated(supply, self._sign)))
+            lately = as_heated(max(w for w in (*self._supplied, -np.inf) if not np.isnan(w)), self._sign)
+            wanted &= water.missed(has, supply)  # cold water is no limit of its source
+            reached = water.reached(loads, supply, self._model.air(zone), lately)
         alone = self._shared.learn(weather, loads, wanted, self._limits)
         for k in np.flatnonzero((loads > _IDLE) & np.isfinite(reached)):
             # what several at their limit give at once says nothing of one of them alone
@@ -189,7 +213,11 @@ class Thermostats:
         """
         if self._model.water is None:
             return None
-        return self._model.water.needed(levels, self.most(outdoor), self._model.air(zone))
+        return self._model.water.needed(levels, self.with_hottest(outdoor), self._model.air(zone))
+
+    def leave_water(self) -> None:
+        """Know that the plant itself has the water in the coming step."""
+        self._water = np.nan
 
     def tell_water(self, levels: FloatArray, outdoor: FloatArray, zone: FloatArray) -> dict[str, float]:
         """Choose the setpoint of supply water for the coming step, where it is decided [K].
@@ -208,3 +236,9 @@ class Thermostats:
             return {}
         self._water = float(found[0])
         return {self._model.water.actuator.name: self._water}
+
+
+def _first(measurements: Measurements, names: Sequence[str], otherwise: float) -> float:
+    """First of some measurements that is known, else something else [K]."""
+    known = [measurements[name] for name in names if name in measurements and np.isfinite(measurements[name])]
+    return float(known[0]) if known else otherwise
