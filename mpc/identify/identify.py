@@ -108,7 +108,8 @@ def identify(telemetry: PlantTelemetry, machines: Sequence[Machine], progress: P
         part = water.bought(loads.level, course.water).sum(axis=1) + water.stored(course.water)
         bought = {kind: values - part[:, CARRIERS.index(kind)] for kind, values in bought.items()}
     maps, base = map_machines(machines, loads, signals, bought, above, per_day, own, reached)
-    source, left = find_source(loads, bought, maps, per_day)
+    told = course is not None or bool(telemetry.site.capacity)
+    source, left = find_source(loads, bought, maps, per_day, told=told)
     if source is not None:
         rest = [{kind: curve for kind, curve in m.powers.items() if kind not in source.powers} for m in maps]
         maps = tuple(replace(m, powers=powers) for m, powers in zip(maps, rest, strict=True))

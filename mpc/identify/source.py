@@ -132,13 +132,14 @@ class Source:
 
 
 def find_source(
-    loads: Loads, bought: Mapping[str, FloatArray], maps: Sequence[MachineMap], per_day: int
+    loads: Loads, bought: Mapping[str, FloatArray], maps: Sequence[MachineMap], per_day: int, *, told: bool = False
 ) -> tuple[Source | None, dict[str, float]]:
     """Find whether one source feeds all machines, by what they buy.
 
     It does where the load of all of them tells what is bought on left-out days better than the loads of each: better
     than a map for each, and better than sources of their own that are all alike, which have as many coefficients: being
-    the smaller model is no merit. What it draws while it runs must be told apart from nothing, and heat be dearer at
+    the smaller model is no merit. Where a description says that one source feeds them, it is taken unless it does worse
+    than these by as much. What it draws while it runs must be told apart from nothing, and heat be dearer at
     half load than at full load. Machines that are commanded, or have sensors of their own power, have maps of their
     own.
 
@@ -152,6 +153,8 @@ def find_source(
         Of the machines.
     per_day : int
         Steps of a day.
+    told : bool
+        Whether the description says that one source feeds all machines.
 
     Returns
     -------
@@ -175,7 +178,8 @@ def find_source(
     errors = {least: error(design) for least, design in designs.items()}
     alike = min(error(source_design(loads.level, shares, loads.outdoor - middle, least)) for least in LEAST)
     least = min(errors, key=errors.__getitem__)
-    if full <= 0.0 or not errors[least] < BETTER * min(alike, error(design_of(loads, range(len(maps))))):
+    better = 1.0 / BETTER if told else BETTER
+    if full <= 0.0 or not errors[least] < better * min(alike, error(design_of(loads, range(len(maps))))):
         return None, {}
     curves, base = {}, {}
     for kind in kinds:

@@ -84,6 +84,22 @@ def test_machines_of_their_own_are_none(power, own: bool) -> None:
     assert _found(loads, power(loads), own) == (None, {})
 
 
+def test_a_source_that_is_told_is_taken_where_telemetry_does_not_refuse_it() -> None:
+    """Rooms that move together, which cannot tell one heat pump from one for each; baseboards are none all the same."""
+    loads = _loads(3)
+    rng = np.random.default_rng(8)
+    same = np.clip(loads.level.mean(axis=1)[:, None] + rng.normal(0.0, 0.02, (N, 4)), 0.0, 1.0)
+    alike = Loads(same, loads.outdoor, loads.emitter)
+    bought = {"electricity": 300.0 + _heat_pump(same.mean(axis=1), loads.outdoor) + rng.normal(0.0, 400.0, N)}
+    maps, _ = map_machines(MACHINES, alike, FULL * same, bought, np.full((N, 4), np.nan), 96)
+    assert find_source(alike, bought, maps, 96) == (None, {})
+    source, _ = find_source(alike, bought, maps, 96, told=True)
+    assert source is not None and 0.15 <= source.least <= 0.4 and source.dearer > 1.05
+    heaters = {"electricity": FULL * loads.level @ [0.2, 1.0, 0.3, 0.9] + rng.normal(0.0, 100.0, N)}
+    maps, _ = map_machines(MACHINES, loads, FULL * loads.level, heaters, np.full((N, 4), np.nan), 96)
+    assert find_source(loads, heaters, maps, 96, told=True) == (None, {})
+
+
 def test_a_source_as_good_at_part_load_is_none() -> None:
     """A boiler whose left-out days the total tells much better: by what it buys at half load it needs no map."""
     loads = _loads(2)
