@@ -20,7 +20,7 @@ from mpc.identify.shared import out_of_reach, shared_of
 from mpc.identify.source import find_source
 from mpc.identify.telemetry import CARRIERS, SET, PlantTelemetry
 from mpc.identify.water import SupplyWater
-from mpc.identify.water_regression import WaterCourse, decided_water, find_water
+from mpc.identify.water_regression import WaterCourse, find_water
 from thermal._types import FloatArray
 from thermal.case.points import ZONE_TEMPERATURE
 
@@ -180,7 +180,7 @@ def _water_notes(
     if setpoint is None or water is not None:
         return ()
     why = "no setpoints of all zones with heat meters are controlled"
-    if course is not None and decided_water(telemetry.site, machines) is not None:
+    if course is not None:
         why = f"it was told in {course.moved.mean():.0%} of the steps, which does not tell that hotter water costs more"
         why = why if machines[0].sign > 0.0 else why.replace("hotter", "colder")
     return (f"{setpoint.name} is left to the plant: {why}",)
