@@ -105,7 +105,7 @@ def identify(telemetry: PlantTelemetry, machines: Sequence[Machine], progress: P
     water = None if course is None else find_water(course, telemetry, machines, loads, bought)
     reached = loads.level if course is None else _reached(course, water, telemetry, machines, loads)
     if course is not None and water is not None:
-        part = water.bought(loads.level, course.water).sum(axis=1) + water.stored(course.water)
+        part = water.apart(loads.level, course.water)
         bought = {kind: values - part[:, CARRIERS.index(kind)] for kind, values in bought.items()}
     maps, base = map_machines(machines, loads, signals, bought, above, per_day, own, reached)
     told = course is not None or bool(telemetry.site.capacity)

@@ -30,6 +30,9 @@ _TELLS = 0.2
 #: [-]: radiators give heat late.
 _STEADY = 0.9
 
+#: Time over which a terminal may still give the heat of hotter water [s].
+LATELY = 3600.0
+
 #: How much farther below its setpoint than usual water stays where its source gives all that it can [K].
 _MISSED = 2.0
 
@@ -196,6 +199,18 @@ class SupplyWater:
             Measured supply [K].
         """
         return stored(water, self.sign)[:, None] * self._by(STORED)
+
+    def apart(self, loads: FloatArray, water: FloatArray) -> FloatArray:
+        """Power of each kind by the temperature of the water and into it, shape (n_time, n_carrier) [W].
+
+        Parameters
+        ----------
+        loads : ndarray, shape (n_time, n_machine)
+            Given [-].
+        water : ndarray, shape (n_time,)
+            Measured supply [K].
+        """
+        return np.asarray(self.bought(loads, water).sum(axis=1) + self.stored(water))
 
     def _hotter(self, water: FloatArray | float) -> FloatArray:
         return np.asarray((water - as_heated(self.temperature, self.sign)) / PER)

@@ -16,16 +16,13 @@ from mpc.identify.machines import Machine, as_heated
 from mpc.identify.regression import Loads, curve_of, design_of, least_squares, left_out_error
 from mpc.identify.source import LEAST, source_design
 from mpc.identify.telemetry import SET, PlantTelemetry, Site
-from mpc.identify.water import STORED, WATER, SupplyWater, sensor_of, stored
+from mpc.identify.water import LATELY, STORED, WATER, SupplyWater, sensor_of, stored
 from mpc.loop.actuators import Actuator
 from thermal._types import BoolArray, FloatArray
 
 #: Share of the steps in which water has to have been told for its worth to be known [-]: a plant's own reset is a
 #: function of the weather, which bends what is bought by itself.
 _TOLD = 0.1
-
-#: Time over which a terminal may still give the heat of hotter water [s].
-_LATELY = 3600.0
 
 #: Steps with the plant's own setpoint that a line over outdoor air takes at least.
 _FEWEST = 8
@@ -112,7 +109,7 @@ class WaterCourse:
         sign : float
             As of `SupplyWater` [-].
         """
-        course = pd.Series(as_heated(self.water, sign)).rolling(max(round(_LATELY / step), 1) + 1, min_periods=1)
+        course = pd.Series(as_heated(self.water, sign)).rolling(max(round(LATELY / step), 1) + 1, min_periods=1)
         return np.asarray(as_heated(course.max().to_numpy(), sign))
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from mpc.identify.limits import OUT_OF_REACH, HeatLimit
 from mpc.identify.machines import as_heated, pairs_as_heated
 from mpc.identify.model import PlantModel
 from mpc.identify.shared import SharedLimit, out_of_reach
+from mpc.identify.water import LATELY
 from mpc.loop.plant import Measurements
 from thermal._types import FloatArray
 
@@ -26,9 +26,6 @@ _PUSH = 0.5
 #: nothing makes up for what model and forecast have wrong. Chosen on the office's cold weeks, where zones are 0.18 K h
 #: below their band with it and 0.62 without, for 1.2 % more; the only size that was tried.
 _RESERVE = 0.05
-
-#: Time over which a terminal may still give the heat of hotter water [s].
-_HOUR = 3600.0
 
 
 class Thermostats:
@@ -55,7 +52,7 @@ class Thermostats:
         self._error = ForecastError(model.step)
         self._told, self._zone = np.full(len(model.maps), np.nan), np.full(len(model.box.zones), np.nan)
         self._served, self._water = model.box.serves, np.nan
-        self._supplied = deque[float](maxlen=max(round(_HOUR / model.step), 1) + 1)
+        self._supplied = deque[float](maxlen=max(round(LATELY / model.step), 1) + 1)
 
     def most(self, outdoor: FloatArray) -> FloatArray:
         """Largest loads, shape (N, n_machine) [-]: 1 of machines that are commanded.
@@ -139,8 +136,8 @@ class Thermostats:
         wanted, reached = (loads > _IDLE) & out_of_reach(missing, full), loads
         if (water := self._model.water) is not None:
             # as it is measured, else as the plant has its setpoint, else as it was told
-            has = _first(measurements, (water.actuator.name,), self._water)
-            supply = _first(measurements, (water.sensor,), has)
+            has = _known(measurements, water.actuator.name, self._water)
+            supply = _known(measurements, water.sensor, has)
             self._supplied.append(float(as_heated(supply, self._sign)))
             lately = as_heated(max(w for w in (*self._supplied, -np.inf) if not np.isnan(w)), self._sign)
             wanted &= water.missed(has, supply)  # cold water is no limit of its source
@@ -238,7 +235,6 @@ class Thermostats:
         return {self._model.water.actuator.name: self._water}
 
 
-def _first(measurements: Measurements, names: Sequence[str], otherwise: float) -> float:
-    """First of some measurements that is known, else something else [K]."""
-    known = [measurements[name] for name in names if name in measurements and np.isfinite(measurements[name])]
-    return float(known[0]) if known else otherwise
+def _known(measurements: Measurements, name: str, otherwise: float) -> float:
+    """Take a measurement, or something else while it is unknown [K]."""
+    return float(measurements[name]) if name in measurements and np.isfinite(measurements[name]) else otherwise

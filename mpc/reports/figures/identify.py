@@ -59,8 +59,7 @@ def map_pictures(found: Identified) -> list[Picture]:
     outdoor, bought = float(np.median(found.loads.outdoor)), found.telemetry.bought
     if (water := found.model.water) is not None:  # points as with the water that maps are told at
         supply = found.telemetry.bridged(found.telemetry.frame[water.sensor], np.nan)
-        apart = water.bought(found.loads.level, supply).sum(axis=1) + water.stored(supply)
-        bought = bought - apart.sum(axis=1)
+        bought = bought - water.apart(found.loads.level, supply).sum(axis=1)
     if found.model.source is not None:
         return [_source_picture(found, found.model.source, outdoor, bought)]
     drawn = []
