@@ -14,6 +14,9 @@ from thermal.network.topology import Room
 #: part of K: where none is ever opened, it would tie the zones to their usual temperatures.
 _WIND, _ROOT, _PRESENCE = 3.0, 3.0, 0.3
 
+#: Hours of the clock between which ventilation at night runs [h], and the share of a day that they are [-].
+_NIGHT, _NIGHTLY = (22.0, 6.0), 1.0 / 3.0
+
 #: Outdoor temperatures between which windows come to be opened [K].
 _MILD = (285.15, 295.15)
 
@@ -38,6 +41,15 @@ def _by_stack(inputs: InputProvider, zone: str) -> FloatArray:
 def _by_opening(inputs: InputProvider, zone: str) -> FloatArray:
     mild = np.clip((inputs.outdoor - _MILD[0]) / (_MILD[1] - _MILD[0]), 0.0, 1.0)
     return inputs.occupancy * mild * _out(inputs, zone)
+
+
+def _by_fans(inputs: InputProvider, zone: str) -> FloatArray:
+    return np.asarray((inputs.occupancy - _PRESENCE) * _out(inputs, zone))
+
+
+def _by_fans_at_night(inputs: InputProvider, zone: str) -> FloatArray:
+    night = (inputs.clock >= _NIGHT[0]) | (inputs.clock < _NIGHT[1])
+    return np.asarray((night - _NIGHTLY) * _out(inputs, zone))
 
 
 def _by_hand(inputs: InputProvider, zone: str) -> FloatArray:
@@ -88,6 +100,21 @@ def _build_opening(builder: EffectBuilder) -> None:
         builder.heat_air(room, builder.parameter("opened_window_area", zone=room.name), seen, heat)
 
 
+def _build_ventilation(builder: EffectBuilder) -> None:
+    """Exchange the zones' air with outdoor while fans run: its mean by K, the rest as heat."""
+    outdoor = builder.graph.boundary("outdoor")
+    for room in builder.rooms:
+        heat = builder.anatomy.air_heat_capacity * room.volume / 3600.0
+        for name, mean, of, needs in (
+            ("ventilation_with_people", _PRESENCE, _by_fans, ("occupancy",)),
+            ("ventilation_at_night", _NIGHTLY, _by_fans_at_night, ()),
+        ):
+            rate = builder.parameter(name, zone=room.name)
+            builder.air_to(room, rate, outdoor, mean * heat)
+            varying = Signal.made(f"{name} of {room.name}", "K", of, *_OUT, *needs, given={"zone": room.name})
+            builder.heat_air(room, rate, varying, heat)
+
+
 def _build_mixing(builder: EffectBuilder) -> None:
     heat, inside = builder.anatomy.air_heat_capacity, {room.name for room in builder.rooms}
     pairs = [pair for pair in builder.anatomy.partitions if set(pair) <= inside]
@@ -109,4 +136,5 @@ def _build_mixing(builder: EffectBuilder) -> None:
 INFILTRATION = described("infiltration", _build_infiltration, without_facades)
 THERMAL_BRIDGE = described("thermal_bridge", _build_bridge, without_facades)
 WINDOW_OPENING = described("window_opening", _build_opening, without_facades)
+VENTILATION = described("ventilation", _build_ventilation)
 ZONE_MIXING = described("zone_mixing", _build_mixing, lacking("partitions", "no two zones share a partition"))

@@ -27,7 +27,7 @@ DOCS = Path(__file__).parents[3] / "docs"
 IDS = (
     "solar_gain solar_opaque longwave_sky wind_film infiltration internal_gains interfloor_exchange ground_exchange "
     "roof_exchange hidden_mass zone_mixing sensor_bias sensor_lag duct_loss flow_gain capacity_limit valve_leak "
-    "clock_shift latent_load neighbour window_opening thermal_bridge blinds wrong_station"
+    "clock_shift latent_load neighbour window_opening thermal_bridge blinds wrong_station ventilation"
 ).split()
 
 

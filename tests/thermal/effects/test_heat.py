@@ -393,6 +393,6 @@ def test_every_effect_of_heat_is_worked_out_here_or_with_the_meters() -> None:
     here = {
         "solar_gain", "blinds", "solar_opaque", "longwave_sky", "wind_film", "infiltration", "window_opening",
         "thermal_bridge", "neighbour", "interfloor_exchange", "ground_exchange", "roof_exchange", "internal_gains",
-        "latent_load", "zone_mixing",
+        "latent_load", "zone_mixing", "ventilation",
     }  # fmt: skip
     assert here | with_the_meters == set(CATALOGUE)
