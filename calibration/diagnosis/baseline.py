@@ -4,9 +4,22 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
+from calibration.evaluation.settings import ModelSettings
 from calibration.fit.ladder import fit_emitter
 from calibration.fit.left_out import values_of
 from calibration.progress import Progress
+from thermal.network.structure import Structure
+
+
+def drawn_settings(dx: float | None) -> ModelSettings:
+    """Give the model settings of a building as drawn, whose inside films follow the heat of their zone.
+
+    Parameters
+    ----------
+    dx : float, optional
+        Distance between control volumes of a plan [m]; the plan's cell size by default.
+    """
+    return ModelSettings(dx=dx, structure=Structure(natural_films=True))
 
 
 def fit_baseline(

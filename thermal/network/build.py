@@ -15,7 +15,7 @@ from thermal.case.plan import facade_areas, zone_floor_areas
 from thermal.errors import ModelError
 from thermal.network.commands import add_commanded
 from thermal.network.emitters import add_emitters
-from thermal.network.films import add_films
+from thermal.network.films import add_natural_convection, add_wind
 from thermal.network.floor import Floor, Zone
 from thermal.network.graph import GraphBuilder
 from thermal.network.grid import floor_grid
@@ -211,9 +211,11 @@ def blueprint(
     if structure.lumped:
         return _lumped(building, dx, structure)
     baseline = _drawn(building, dx, reach, scopes, diffusers, mean_shuffle, structure)
-    if structure.follows_weather:
-        add_films(baseline.graph, structure)
+    if structure.wind_films:
+        add_wind(baseline.graph)
     add_emitters(baseline.graph, emitters_of(building, structure.emitter))
+    if structure.natural_films:
+        add_natural_convection(baseline.graph)
     add_commanded(baseline.graph, building)
     return baseline
 

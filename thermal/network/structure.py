@@ -105,8 +105,8 @@ class Structure:
     wind_films : bool
         Outside films that follow the wind, of a model that is not lumped.
     natural_films : bool
-        Inside films that follow the temperature difference to outdoors, of a model with a radiant node that is not
-        lumped.
+        Inside films that follow the heat of their zone, as natural convection does, of a model with a radiant node that
+        is not lumped.
     emitter : {"air", "radiator", "floor"}
         What plain heaters of which a case does not say it give their heat by: the air alone, surfaces too, or floors
         too, each zone's by a share that is fitted.
@@ -133,11 +133,6 @@ class Structure:
     wind_films: bool = False
     natural_films: bool = False
     emitter: Unknown = "air"
-
-    @property
-    def follows_weather(self) -> bool:
-        """Whether its films follow wind or temperatures, which takes a `Normalisation`."""
-        return self.wind_films or self.natural_films
 
     def __post_init__(self) -> None:
         for name in ("furniture", "radiant", "lumped", "sun", "recurring", "wind_films", "natural_films"):
