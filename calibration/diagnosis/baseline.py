@@ -1,31 +1,22 @@
-"""The baseline of a diagnosis: as drawn, with what heaters give their heat by where the case does not say it."""
+"""The baseline of a diagnosis: as drawn, with films and emitters by the evidence where the case does not say them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
-from calibration.evaluation.settings import ModelSettings
+from calibration.fit.fitted_case import is_large
 from calibration.fit.ladder import fit_emitter
 from calibration.fit.left_out import values_of
 from calibration.progress import Progress
-from thermal.network.structure import Structure
-
-
-def drawn_settings(dx: float | None) -> ModelSettings:
-    """Give the model settings of a building as drawn, whose inside films follow the heat of their zone.
-
-    Parameters
-    ----------
-    dx : float, optional
-        Distance between control volumes of a plan [m]; the plan's cell size by default.
-    """
-    return ModelSettings(dx=dx, structure=Structure(natural_films=True))
 
 
 def fit_baseline(
     models: ModelComparison, effects: Mapping[str, Sequence[str]], progress: Progress | None = None
 ) -> tuple[ModelComparison, Fit]:
-    """Fit the baseline, with heated floors or radiators if left-out tuning days say so.
+    """Fit the baseline, with inside films that follow the heat if that is likelier, and emitters by left-out days.
+
+    Natural convection needs no parameter, so that evidence alone decides. In buildings of more than 40 zones it is left
+    out. Heated floors or radiators are taken if left-out tuning days say so.
 
     Parameters
     ----------
@@ -43,6 +34,12 @@ def fit_baseline(
     """
     known = {name: tuple(zones) for name, zones in effects.items()}
     found = models.fit(known, [{}])
+    if not is_large(models.case.building.zone_names) and not models.settings.structure.lumped:
+        structure = replace(models.settings.structure, natural_films=True)
+        convective = replace(models, settings=replace(models.settings, structure=structure))
+        convective.drivers = models.drivers
+        if (other := convective.fit(known, [found.values])).evidence > found.evidence:
+            models, found = convective, other
     heated = fit_emitter(found.known, models, known, progress)
     if heated is None:
         return models, found

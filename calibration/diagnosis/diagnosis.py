@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from calibration.diagnosis.baseline import drawn_settings, fit_baseline
+from calibration.diagnosis.baseline import fit_baseline
 from calibration.diagnosis.correction import CORRECTED, Correction, correct
 from calibration.diagnosis.decide.verdict import Verdict, chance_of
 from calibration.diagnosis.decide.where import DriftCurve, Where, drift_of, where_it_lies
@@ -385,5 +385,5 @@ def baseline_gap(
     CalibrationError
         When an interval has no usable run.
     """
-    models = ModelComparison(case, drawn_settings(dx), tune, hold_out, horizon)
+    models = ModelComparison(case, ModelSettings(dx=dx), tune, hold_out, horizon)
     return float(held_out(*fit_baseline(models, {})).mae)

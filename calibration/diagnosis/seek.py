@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
-from calibration.diagnosis.baseline import drawn_settings, fit_baseline
+from calibration.diagnosis.baseline import fit_baseline
 from calibration.diagnosis.decide.verdict import Verdict, doubted, gains_of, judge, summarised
 from calibration.diagnosis.faults import LEAST, Fault, mend, with_faults
 from calibration.diagnosis.free import Free, drawing_fails, held_against, must_be_better_by, search_free, with_recurring
@@ -22,6 +22,7 @@ from calibration.diagnosis.refit.refit import HeldOut, elsewhere, held_out
 from calibration.diagnosis.refit.search import Round, search
 from calibration.diagnosis.screen.regular import Regular, regular
 from calibration.evaluation.intervals import Interval
+from calibration.evaluation.settings import ModelSettings
 from calibration.fit.fitted_case import FittedCase, is_large
 from calibration.fit.ladder import ADVANCE, GAINS
 from calibration.fit.left_out import LeftOut, left_out
@@ -187,7 +188,7 @@ def seek(
         mended: tuple[Fault, ...], tuned: Sequence[Interval] = tune, judged: Sequence[Interval] = hold_out
     ) -> Sought:
         of = mended[-1].mended if mended else case
-        models = ModelComparison(of, drawn_settings(dx), tuned, judged, horizon)
+        models = ModelComparison(of, ModelSettings(dx=dx), tuned, judged, horizon)
         return replace(_seek(models, known, ruled_out, whole), faults=mended)
 
     sought, certain = without(faults), tuple(itertools.takewhile(lambda fault: fault.is_certain, faults))

@@ -103,7 +103,7 @@ class ModelSettings:
     def to_dict(self) -> dict[str, Any]:
         """Entry of ``calibration.json``."""
         effects = {name: list(zones) for name, zones in self.effects.items()}
-        counted = self.effects or self.structure.wind_films
+        counted = self.effects or self.structure.is_counted
         kept = self.normalisation.to_dict() if counted and self.normalisation is not None else None
         return {**asdict(replace(self, normalisation=None)), "effects": effects, "normalisation": kept}
 

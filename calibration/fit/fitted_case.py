@@ -220,7 +220,7 @@ def with_normalisation(settings: CalibrationSettings, case: Case, tuned: Sequenc
     tuned : sequence of Interval
         Where it is fitted.
     """
-    if not (settings.effects or settings.structure.wind_films):
+    if not (settings.effects or settings.structure.is_counted):
         return settings
     return replace(settings, normalisation=fit_normalisation(case, ((i.start, i.end) for i in tuned)))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Protocol
@@ -55,6 +55,12 @@ _EMITTERS: tuple[Unknown, Unknown] = ("floor", "radiator")
 
 #: Tuning days from which a gain that recurs from day to day is looked for [days]: it has to recur.
 _WEEK = 7.0
+
+#: Films that follow something, by the name of the structure: what they follow, and what has them do so.
+_FILMS: dict[str, tuple[str, Callable[[Structure], Structure]]] = {
+    "natural convection": ("heat", lambda structure: replace(structure, natural_films=True)),
+    "wind": ("wind", lambda structure: replace(structure, wind_films=True)),
+}
 
 #: Structures without a drawing.
 _LUMPED = ("lumped", "lumped floor", "recurring")
@@ -229,12 +235,14 @@ def climb_from(
     people = ladder.people(base, fitted, beside, (1.0 - advance) * looked[best].left.mae)
     free = ladder.lumped(Structure(lumped=True, sun=source.gives("sun")), looked[best].left.mae)
     drawn = min(each.left.mae for each in free) >= _WRONG * looked[best].left.mae
-    if plain and drawn and source.gives("wind"):
-        follows = replace(base, structure=replace(base.structure, wind_films=True))
-        wind = _begun(given, follows, fitted)
-        if (seen := ladder.look("wind", wind)).left.mae < looked[best].left.mae:
-            looked.append(seen)
-            begun["wind"], base, fitted = (follows, fitted), follows, wind
+    least = looked[best].left.mae
+    for name, (signal, followed) in _FILMS.items() if plain and drawn else ():
+        follows = replace(base, structure=followed(base.structure))
+        if follows.structure != base.structure and source.gives(signal):
+            begins = _begun(given, follows, fitted)
+            if (seen := ladder.look(name, begins)).left.mae < least:
+                looked.append(seen)
+                least, begun[name], base, fitted = seen.left.mae, (follows, fitted), follows, begins
     differing = set(chain(*by_zone(given.case.building)))
     scopes: dict[str, Scope] = {p.base: "zone" for p in parameters if p.base in differing}
     if scopes and plain and drawn and not base.scopes and len(fitted.model.network.zones) > 1:
@@ -264,7 +272,7 @@ def _best(looked: Sequence[_Looked], advance: float, lumped_advance: float = ADV
     for number, other in enumerate(looked):
         over_the_first = lumped_advance if other.name in _LUMPED else advance
         # films that follow the wind have no more parameters
-        least = 0.0 if other.name == "wind" else ADVANCE if best else over_the_first
+        least = 0.0 if other.name in _FILMS else ADVANCE if best else over_the_first
         if other.left.mae < (1.0 - least) * looked[best].left.mae:
             best = number
     return best

@@ -14,9 +14,10 @@ CATALOGUE: dict[str, Effect] = {
     for e in (
         envelope.ROOF_EXCHANGE, gains.SOLAR_GAIN, gains.BLINDS, gains.SOLAR_OPAQUE, envelope.LONGWAVE_SKY,
         envelope.WIND_FILM, air.INFILTRATION, air.THERMAL_BRIDGE, air.WINDOW_OPENING, air.VENTILATION,
-        gains.INTERNAL_GAINS, gains.LATENT_LOAD, envelope.INTERFLOOR_EXCHANGE, envelope.GROUND_EXCHANGE, envelope.NEIGHBOUR,
-        envelope.HIDDEN_MASS, air.ZONE_MIXING, envelope.WRONG_STATION, metering.CLOCK_SHIFT, metering.FLOW_GAIN,
-        metering.DUCT_LOSS, metering.CAPACITY_LIMIT, metering.VALVE_LEAK, metering.SENSOR_BIAS, metering.SENSOR_LAG,
+        gains.INTERNAL_GAINS, gains.LATENT_LOAD, envelope.INTERFLOOR_EXCHANGE, envelope.GROUND_EXCHANGE,
+        envelope.NEIGHBOUR, envelope.HIDDEN_MASS, air.ZONE_MIXING, envelope.WRONG_STATION, metering.CLOCK_SHIFT,
+        metering.FLOW_GAIN, metering.DUCT_LOSS, metering.CAPACITY_LIMIT, metering.VALVE_LEAK, metering.SENSOR_BIAS,
+        metering.SENSOR_LAG,
     )
 }  # fmt: skip
 

@@ -7,6 +7,7 @@ difference that the zone's heat itself makes between its air and its surfaces, a
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -15,16 +16,17 @@ import scipy.sparse.linalg as sla
 
 from thermal._types import FloatArray
 from thermal.inputs.provider import InputProvider
-from thermal.inputs.signals import Signal, of_zone
+from thermal.inputs.signals import Signal
 from thermal.network.graph import GraphBuilder
 from thermal.network.structure import RATED_OUTSIDE_FILM
+from thermal.network.topology import NATURAL, NaturalConvection
 
 #: Outside film ``4 + 4 v`` [W/m2/K] (ISO 6946:2017, Annex C).
 _STILL, _BY_WIND = 4.0, 4.0
 
 #: Natural convection at a wall, turbulent: ``1.31 |ΔT|^(1/3)`` [W/m2/K] (ASHRAE Fundamentals 2017, ch. 4; EnergyPlus'
 #: TARP), so that heat grows with the power 4/3 of the difference.
-_NATURAL, _POWER = 1.31, 4.0 / 3.0
+_AT_ONE_KELVIN = 1.31
 
 #: Difference between a zone's air and its surfaces that the film coefficient is estimated for [K]: natural convection
 #: is then 2.1 W/m2/K. On nulls of EnergyPlus (practice cases, offices of two makers, reference buildings) it hardly
@@ -75,13 +77,12 @@ def add_natural_convection(graph: GraphBuilder) -> None:
     graph : GraphBuilder
         The baseline without effects, with its emitters.
     """
-    for room in (r for r in graph.anatomy.rooms.values() if r.radiant >= 0 and not r.emitted):
+    for room in (r for r in [*graph.anatomy.rooms.values()] if r.radiant >= 0 and not r.emitted):
         air = np.append(room.air, room.mean)
         surface = sum(weight[np.isin(far, air)].sum() for _, _, far, weight in graph.touching(np.array([room.radiant])))
-        own = float(_NATURAL * _DIFFERENCE**_POWER * surface)
-        signal = Signal.made(
-            f"natural convection of {room.name}", "W", _passed_on, "heat", given={"zone": room.name, "own": own}
-        )
+        own = float(_AT_ONE_KELVIN * _DIFFERENCE**NATURAL * surface)
+        convection = NaturalConvection(room.name, own)
+        graph.anatomy.rooms[room.name], signal = replace(room, convection=convection), convection.signal
         graph.source(f"natural convection from the air of {room.name}", -1.0, room.air, signal, room.share)
         graph.source(f"natural convection to surfaces of {room.name}", 1.0, room.radiant, signal, 1.0)
 
@@ -115,8 +116,3 @@ def _apart(inputs: InputProvider) -> FloatArray:
 def _wind(inputs: InputProvider) -> FloatArray:
     film, mean = (_STILL + _BY_WIND * v for v in (inputs.wind, inputs.normalisation.wind or 0.0))
     return np.asarray((film / mean - 1.0) * _apart(inputs))
-
-
-def _passed_on(inputs: InputProvider, zone: str, own: float) -> FloatArray:
-    heat = of_zone(inputs, "heat", zone)
-    return np.asarray(heat - np.sign(heat) * own ** (1.0 - 1.0 / _POWER) * np.abs(heat) ** (1.0 / _POWER))

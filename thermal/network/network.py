@@ -16,6 +16,9 @@ from thermal.inputs.signals import Signal
 from thermal.network.topology import Anatomy
 from thermal.parameters import Parameter
 
+#: Heat of a zone that is usual while it is heated or cooled, over that which it exceeds in 1 % of the time [-].
+_USUAL = 0.5
+
 
 @dataclass(frozen=True)
 class ConductanceClass:
@@ -153,12 +156,19 @@ class ThermalNetwork:
 
     @cached_property
     def emitted(self) -> FloatArray:
-        """Signals of emitters by the heat of the zones, where that alone is known, shape (n_signal, n_zone) [W/W]."""
+        """Signals by the heat of the zones, where that alone is known or planned, shape (n_signal, n_zone) [W/W].
+
+        Those of emitters, and of natural convection by the secant at a usual heat of the zone.
+        """
         found = np.zeros((len(self.signals), len(self.zones)))
         numbers = {signal.name: number for number, signal in enumerate(self.signals)}
         for room in self.anatomy.rooms.values():
             for emission in room.emitted:
                 found[numbers[emission.signal.name], room.number] = emission.share_of_zone
+            usual = _USUAL * (self.normalisation.heat.get(room.name, 0.0) if self.normalisation is not None else 0.0)
+            if room.convection is not None and usual > 0.0:
+                share = float(room.convection.passed_on(np.array(usual))) / usual
+                found[numbers[room.convection.signal.name], room.number] = share
         return found
 
     @property

@@ -134,6 +134,11 @@ class Structure:
     natural_films: bool = False
     emitter: Unknown = "air"
 
+    @property
+    def is_counted(self) -> bool:
+        """Whether its films follow something that is counted by a `Normalisation`."""
+        return self.wind_films or self.natural_films
+
     def __post_init__(self) -> None:
         for name in ("furniture", "radiant", "lumped", "sun", "recurring", "wind_films", "natural_films"):
             if not isinstance(getattr(self, name), bool):

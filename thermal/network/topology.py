@@ -11,7 +11,8 @@ import numpy as np
 
 from thermal._types import FloatArray, IntArray
 from thermal.case.building import FACADES, FloorPlan, FloorPlans
-from thermal.inputs.signals import Signal
+from thermal.inputs.provider import InputProvider
+from thermal.inputs.signals import Signal, of_zone
 
 #: Tilt of a vertical, an upward and a downward face [deg].
 VERTICAL, UPWARD, DOWNWARD = 90.0, 0.0, 180.0
@@ -151,6 +152,50 @@ class Heated:
     share: FloatArray
     area: float
 
+#: Power of the temperature difference by which natural convection at a wall takes heat, turbulent [-].
+NATURAL = 4.0 / 3.0
+
+
+@dataclass(frozen=True)
+class NaturalConvection:
+    """Heat of a zone that its surfaces take from the air at once, as natural convection grows with the heat.
+
+    Parameters
+    ----------
+    zone : str
+        Whose.
+    own : float
+        Heat of the zone for which the film coefficient is [W].
+    """
+
+    zone: str
+    own: float
+
+    @property
+    def signal(self) -> Signal:
+        """Its course [W]."""
+        given = {"zone": self.zone, "own": self.own}
+        return Signal.made(f"natural convection of {self.zone}", "W", _passed_on, "heat", given=given)
+
+    def passed_on(self, heat: FloatArray) -> FloatArray:
+        """Give what surfaces take beyond what a film of one coefficient lets pass [W].
+
+        Parameters
+        ----------
+        heat : ndarray
+            Of the zone's devices [W].
+
+        Examples
+        --------
+        >>> NaturalConvection("A", 1000.0).passed_on(np.array([0.0, 500.0, 1000.0, 2000.0])).round(1).tolist()
+        [0.0, -94.6, 0.0, 318.2]
+        """
+        return np.asarray(heat - np.sign(heat) * self.own ** (1.0 - 1.0 / NATURAL) * np.abs(heat) ** (1.0 / NATURAL))
+
+
+def _passed_on(inputs: InputProvider, zone: str, own: float) -> FloatArray:
+    return NaturalConvection(zone, own).passed_on(of_zone(inputs, "heat", zone))
+
 
 @dataclass(frozen=True)
 class Room:
@@ -178,6 +223,8 @@ class Room:
         [m2] and [m3].
     emitted : tuple of Emission
         Heat of its devices that does not all go to the air.
+    convection : NaturalConvection, optional
+        Where its inside films follow its heat.
     """
 
     name: str
@@ -192,6 +239,7 @@ class Room:
     floor_area: float
     volume: float
     emitted: tuple[Emission, ...] = ()
+    convection: NaturalConvection | None = None
 
 
 @dataclass(frozen=True)
