@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from calibration.diagnosis.decide.levels import APART
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.fit.fitted_case import is_large
 from calibration.fit.ladder import fit_emitter
@@ -15,8 +16,8 @@ def fit_baseline(
 ) -> tuple[ModelComparison, Fit]:
     """Fit the baseline, with inside films that follow the heat if that is likelier, and emitters by left-out days.
 
-    Natural convection needs no parameter, so that evidence alone decides. In buildings of more than 40 zones it is left
-    out. Heated floors or radiators are taken if left-out tuning days say so.
+    Natural convection needs no parameter: evidence decides, once it is strong. In buildings of more than 40 zones it is
+    left out. Heated floors or radiators are taken if left-out tuning days say so.
 
     Parameters
     ----------
@@ -38,7 +39,7 @@ def fit_baseline(
         structure = replace(models.settings.structure, natural_films=True)
         convective = replace(models, settings=replace(models.settings, structure=structure))
         convective.drivers = models.drivers
-        if (other := convective.fit(known, [found.values])).evidence > found.evidence:
+        if (other := convective.fit(known, [found.values])).evidence > found.evidence + APART:
             models, found = convective, other
     heated = fit_emitter(found.known, models, known, progress)
     if heated is None:

@@ -30,8 +30,9 @@ from thermal.units import AIR_HEAT_CAPACITY
 #: Effects that may begin or end from one day to the next. Walls, roofs, grounds, films and neighbours do not: their
 #: strengths are learnt as the seasons show them, like the parameters of the baseline.
 MAY_CHANGE = (
-    "solar_gain", "infiltration", "window_opening", "internal_gains", "hidden_mass", "zone_mixing", "wrong_station",
-    "clock_shift", "flow_gain", "duct_loss", "capacity_limit", "valve_leak", "sensor_bias", "sensor_lag",
+    "solar_gain", "infiltration", "window_opening", "ventilation", "internal_gains", "hidden_mass", "zone_mixing",
+    "wrong_station", "clock_shift", "flow_gain", "duct_loss", "capacity_limit", "valve_leak", "sensor_bias",
+    "sensor_lag",
 )  # fmt: skip
 
 #: Heat that names no cause: where it explains a change best, the change is of unknown cause.

@@ -166,3 +166,14 @@ def test_heat_that_is_moved_makes_the_difference_of_natural_convection(watts: fl
     linear, ours = (q / (film * surface) * after_an_hour for q in (watts, watts - moved))
     assert ours == pytest.approx(exact, rel=0.02)
     assert abs(linear / exact - 1.0) > (0.1 if abs(watts) > 1000.0 else 0.02)
+
+
+def test_planned_heat_is_passed_on_by_the_secant_of_a_usual_one(flat: Building) -> None:
+    network = build_network(flat, structure=STILL)
+    assert not network.emitted.any()  # nobody has told what is usual
+    known = replace(network, normalisation=Normalisation(heat=dict.fromkeys(flat.zone_names, 3000.0)))
+    for zone, row in enumerate(known.emitted):
+        convection = known.anatomy.rooms[flat.zone_names[zone]].convection
+        assert convection is not None and known.signals[zone].name == convection.signal.name
+        assert row[zone] == pytest.approx(float(convection.passed_on(np.array(1500.0))) / 1500.0)
+        assert np.delete(row, zone).tolist() == [0.0]
