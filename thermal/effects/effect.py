@@ -75,7 +75,8 @@ class Effect:
     courses : bool
         Whether it has a course of its own in each zone that is named; without zones it follows a schedule everywhere.
     alike : bool
-        Whether one cause may give all zones one strength: cold water, a meters' factor. Valves leak one by one.
+        Whether one cause may give all zones one strength, such as cold water; valves leak one by one. A factor of all
+        meters is a scale of all masses and conductances, which nothing but a known heater tells, and is not sought.
     requires : tuple of str
         Effects that it modifies, and without which it means nothing.
     applies : callable, optional

@@ -41,10 +41,11 @@ def climbed(case: Case) -> CalibrationResult:
 
 
 def test_what_predicts_left_out_days_better_is_kept(climbed: CalibrationResult) -> None:
-    drawn, wind, zoned, lumped, shifted = climbed.rungs
-    assert [rung.name for rung in climbed.rungs] == ["drawn", "wind", "zoned", "lumped", "shifted"]
-    assert zoned.parameters > drawn.parameters == wind.parameters
-    assert wind.left_out_mae < drawn.left_out_mae  # or it would not have been fitted
+    drawn, convective, wind, zoned, lumped, shifted = climbed.rungs
+    names = ["drawn", "natural convection", "wind", "zoned", "lumped", "shifted"]
+    assert [rung.name for rung in climbed.rungs] == names
+    assert zoned.parameters > drawn.parameters == convective.parameters == wind.parameters
+    assert wind.left_out_mae < convective.left_out_mae < drawn.left_out_mae  # or they would not be there
     simpler = min(wind.left_out_mae, zoned.left_out_mae)
     assert lumped.chosen == (lumped.left_out_mae < 0.9 * simpler) and sum(r.chosen for r in climbed.rungs) == 1
     assert climbed.settings.structure.lumped == lumped.chosen
