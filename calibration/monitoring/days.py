@@ -27,8 +27,8 @@ from thermal.model.reduce import SHIFTS, reduced_model
 from thermal.parameters import Parameter
 from thermal.units import AIR_HEAT_CAPACITY
 
-#: Effects that may begin or end from one day to the next. Walls, roofs, grounds, films and neighbours do not: their
-#: strengths are learnt as the seasons show them, like the parameters of the baseline.
+#: Effects that may begin or end from one day to the next. Of walls, roofs, grounds, films and neighbours the strengths
+#: are learnt as the seasons show them, like the parameters of the baseline.
 MAY_CHANGE = (
     "solar_gain", "infiltration", "window_opening", "ventilation", "internal_gains", "hidden_mass", "zone_mixing",
     "wrong_station", "clock_shift", "flow_gain", "duct_loss", "capacity_limit", "valve_leak", "sensor_bias",
@@ -47,8 +47,7 @@ USUAL = ("solar_gain", "infiltration", "internal_gains")
 _SECANTS = {"capacity_lost": (0.2, 0.6), "door_airflow": (0.1,)}
 
 #: Share of people's heat that rooms without a device get, and the strengths that it is a share of: what begins may be
-#: everywhere alike, whatever the share was. Heat in all rooms was called a moved station in three of four houses with
-#: a hall that nothing heats (seeds 21, 29, 69 and 77 of the houses of ``benchmarks/monitoring.py``).
+#: everywhere alike, whatever the share was (seeds 21, 29, 69, 77 of the houses of ``benchmarks/monitoring.py``).
 _ELSEWHERE, _GAINS = "internal_gain_unserved_share", ("internal_gain", "internal_gain_at_home", "base_load")
 
 #: Limits of strengths beside that what is positive stays so: a share of all that a terminal gives, or a meter reads.
