@@ -101,12 +101,12 @@ def _sign(rng: np.random.Generator) -> float:
     return float(rng.choice([-1.0, 1.0]))
 
 
-def _simple(name: str, form: str, **typical: float) -> Draw:
+def _simple(name: str, form: str, *answers: str, **typical: float) -> Draw:
     """Return the draw of an effect of the whole building whose numbers grow with its strength."""
 
     def draw(spec: TrialSpec, rng: np.random.Generator, s: float) -> Effect:
         numbers = {key: round(value * s, 4) for key, value in typical.items()}
-        return Effect(name, form, s, (), numbers, (name,))
+        return Effect(name, form, s, (), numbers, (name, *answers))
 
     return draw
 
@@ -284,14 +284,14 @@ CATALOGUE: dict[str, Draw] = {
 }
 # Effects that the catalogue does not know, and effects of the catalogue in a form that it does not have.
 OUTSIDE: dict[str, Draw] = {
-    "night_ventilation": _simple("night_ventilation", "other", changes_per_hour=2.0),
+    "night_ventilation": _simple("night_ventilation", "other", "ventilation", changes_per_hour=2.0),
     "stratification": _simple("stratification", "other", share=0.15),
     "wrong_station": _simple("wrong_station", "other", offset_K=2.0, night_K=2.0),
     "movable_partition": _movable_partition,
     "server_room": _in_one_zone("server_room", ("internal_gains",), power_W_m2=25.0),
     "phase_change": _simple("phase_change", "other", latent_kJ_m2=150.0, coupling_W_m2_K=4.0),
     "unmetered_heating": _in_one_zone("unmetered_heating", (), power_W_m2_K=1.2),
-    "exhaust_fan": _in_one_zone("exhaust_fan", ("infiltration", "window_opening"), changes_per_hour=2.5),
+    "exhaust_fan": _in_one_zone("exhaust_fan", ("infiltration", "window_opening", "ventilation"), changes_per_hour=2.5),
     "swapped_sensors": _swapped_sensors,
     "sunlit_sensor": _sunlit_sensor,
     "meter_drift": _flow_gain("drift"),
