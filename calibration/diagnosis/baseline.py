@@ -39,7 +39,8 @@ def fit_baseline(
         structure = replace(models.settings.structure, natural_films=True)
         convective = replace(models, settings=replace(models.settings, structure=structure))
         convective.drivers = models.drivers
-        if (other := convective.fit(known, [found.values])).evidence > found.evidence + APART:
+        follows = any(room.convection is not None for room in convective.anatomy.rooms.values())
+        if follows and (other := convective.fit(known, [found.values])).evidence > found.evidence + APART:
             models, found = convective, other
     heated = fit_emitter(found.known, models, known, progress)
     if heated is None:

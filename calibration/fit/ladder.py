@@ -240,6 +240,8 @@ def climb_from(
         follows = replace(base, structure=followed(base.structure))
         if follows.structure != base.structure and source.gives(signal):
             begins = _begun(given, follows, fitted)
+            if len(begins.problem.grid.network.signals) == len(fitted.problem.grid.network.signals):
+                continue  # no film of this building does
             if (seen := ladder.look(name, begins)).left.mae < least:
                 looked.append(seen)
                 least, begun[name], base, fitted = seen.left.mae, (follows, fitted), follows, begins
@@ -271,7 +273,7 @@ def _best(looked: Sequence[_Looked], advance: float, lumped_advance: float = ADV
     best = 0
     for number, other in enumerate(looked):
         over_the_first = lumped_advance if other.name in _LUMPED else advance
-        # films that follow the wind have no more parameters
+        # films that follow something have no more parameters
         least = 0.0 if other.name in _FILMS else ADVANCE if best else over_the_first
         if other.left.mae < (1.0 - least) * looked[best].left.mae:
             best = number

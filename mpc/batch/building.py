@@ -50,12 +50,14 @@ class StepMatrices(NamedTuple):
         outside : sequence of str
             Of `driven_by`: what drives this building or another one; what is another's has no effect here.
         """
-        end, own, heating, output, response = model.step_matrices()
+        end, own, heating, output, _ = model.step_matrices()
+        # natural convection, of which nothing is known in advance but by how much heat there is
+        heating = heating + own[:, own.shape[1] - len(model.network.signals) :] @ model.network.convective
         more, driving = order - end.size, np.zeros((end.size, len(outside)))
         driving[:, [outside.index(name) for name in driven_by(model)]] = own
         moving = np.pad(np.hstack([heating, driving]), ((0, more), (0, 0)))
         left = np.pad(output * end, ((0, 0), (0, more)))
-        return cls(left, output @ driving, response, np.pad(end, (0, more)), moving)
+        return cls(left, output @ driving, output @ heating, np.pad(end, (0, more)), moving)
 
 
 class BatchedBuilding:

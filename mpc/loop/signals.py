@@ -97,7 +97,7 @@ class EffectSignals:
     """
 
     def __init__(self, network: ThermalNetwork, scenario: Scenario, system: HvacSystem) -> None:
-        self._values = np.zeros((scenario.grid.n_steps, len(network.signals)))
+        self._network, self._values = network, np.zeros((scenario.grid.n_steps, len(network.signals)))
         self._live: list[tuple[int, Signal]] = []
         if not network.signals:
             return
@@ -131,15 +131,18 @@ class EffectSignals:
         self._now.put(self._ahead.stamps[k : k + 1], row)
 
     def in_advance(self) -> FloatArray:
-        """Give all signals, shape (n_steps, n_signal) [signal unit].
+        """Give all signals, shape (n_steps, n_signal) [signal unit]; none of natural convection, which follows heat.
 
         Raises
         ------
         PlantError
             When one of them is known only while the plant runs.
         """
-        expected, found = "signals that are known in advance", ", ".join(s.name for _, s in self._live)
-        PlantError.unless(not self._live, "effects of batched plants", expected, found, "leave that effect out")
+        rooms = self._network.anatomy.rooms.values()
+        convective = {room.convection.signal.name for room in rooms if room.convection is not None}
+        live = [s.name for _, s in self._live if s.name not in convective]
+        expected, found = "signals that are known in advance", ", ".join(live)
+        PlantError.unless(not live, "effects of batched plants", expected, found, "leave that effect out")
         return self._values
 
     def known(self, k: int) -> FloatArray:

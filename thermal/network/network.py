@@ -158,15 +158,28 @@ class ThermalNetwork:
     def emitted(self) -> FloatArray:
         """Signals by the heat of the zones, where that alone is known or planned, shape (n_signal, n_zone) [W/W].
 
-        Those of emitters, and of natural convection by the secant at a usual heat of the zone.
+        Those of emitters, and of `convective` heat.
         """
-        found = np.zeros((len(self.signals), len(self.zones)))
+        found = self.convective.copy()
         numbers = {signal.name: number for number, signal in enumerate(self.signals)}
         for room in self.anatomy.rooms.values():
             for emission in room.emitted:
                 found[numbers[emission.signal.name], room.number] = emission.share_of_zone
-            usual = _USUAL * (self.normalisation.heat.get(room.name, 0.0) if self.normalisation is not None else 0.0)
-            if room.convection is not None and usual > 0.0:
+        return found
+
+    @cached_property
+    def convective(self) -> FloatArray:
+        """Signals of natural convection by planned heat, shape (n_signal, n_zone) [W/W].
+
+        By the secant at a usual heat of the zone, no less than a quarter of that for which its film is; none where no
+        normalisation tells what is usual.
+        """
+        found = np.zeros((len(self.signals), len(self.zones)))
+        numbers = {signal.name: number for number, signal in enumerate(self.signals)}
+        known = {} if self.normalisation is None else self.normalisation.heat
+        for room in self.anatomy.rooms.values():
+            if room.convection is not None and room.name in known:
+                usual = max(_USUAL * known[room.name], 0.25 * room.convection.own)
                 share = float(room.convection.passed_on(np.array(usual))) / usual
                 found[numbers[room.convection.signal.name], room.number] = share
         return found

@@ -152,6 +152,7 @@ class Heated:
     share: FloatArray
     area: float
 
+
 #: Power of the temperature difference by which natural convection at a wall takes heat, turbulent [-].
 NATURAL = 4.0 / 3.0
 

@@ -8,15 +8,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mpc.batch.building import StepMatrices, driven_by
 from mpc.errors import PlantError
-from mpc.loop.reduced import reduced_building
+from mpc.loop.building import zone_response
+from mpc.loop.reduced import ReducedBuilding, reduced_building
 from mpc.loop.signals import EffectSignals, scenario_inputs
 from mpc.loop.simulated import SimulatedPlant
 from mpc.scenario.scenario import Scenario
-from thermal import Building, build_network
+from thermal import Building, SymbolicModel, build_network
 from thermal.case.building import Commanded
 from thermal.effects.catalogue import chosen
+from thermal.inputs.normalisation import Normalisation
 from thermal.inputs.signals import signal_values
+from thermal.model.reduce import reduced_model
+from thermal.network.structure import Structure
 from thermal.system.system import HvacSystem
 from thermal.units import AIR_HEAT_CAPACITY
 
@@ -48,6 +53,21 @@ def test_what_the_air_drives_is_of_the_step(
     assert sorted(by_name.values())[0] == 1.0
     still = signals.at(9, np.zeros(12), np.zeros(12), np.zeros(12))
     assert np.count_nonzero(still) <= 1  # what is constant stays
+
+
+def test_plants_of_many_members_pass_heat_on_by_the_secant_of_natural_convection(
+    building: Building, system: HvacSystem, scenario: Callable[..., Scenario]
+) -> None:
+    network = build_network(building, dx=1.0, structure=Structure(natural_films=True))
+    network = replace(network, normalisation=Normalisation(heat=dict.fromkeys(building.zone_names, 2500.0)))
+    assert not EffectSignals(network, scenario(), system).in_advance().any()
+    model = ReducedBuilding(reduced_model(SymbolicModel(network), [network.start()]))
+    heat = np.full(12, 1200.0)
+    matrices = StepMatrices.of(model, model.order, driven_by(model))
+    assert matrices.response @ heat == pytest.approx(zone_response(model, heat) * heat, rel=1e-6)
+    plain = reduced_building(building, dx=1.0)
+    assert np.all(matrices.response @ heat > 1.01 * zone_response(plain, heat) * heat)
+    assert np.all(network.convective.sum(axis=0) < 0.0)  # half of 2.5 kW is less than these films are for
 
 
 def test_a_wrong_clock_is_refused(building: Building, system: HvacSystem, scenario: Callable[..., Scenario]) -> None:
