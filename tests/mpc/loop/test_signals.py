@@ -66,8 +66,9 @@ def test_plants_of_many_members_pass_heat_on_by_the_secant_of_natural_convection
     matrices = StepMatrices.of(model, model.order, driven_by(model))
     assert matrices.response @ heat == pytest.approx(zone_response(model, heat) * heat, rel=1e-6)
     plain = reduced_building(building, dx=1.0)
-    assert np.all(matrices.response @ heat > 1.01 * zone_response(plain, heat) * heat)
-    assert np.all(network.convective.sum(axis=0) < 0.0)  # half of 2.5 kW is less than these films are for
+    warmer = matrices.response @ heat > zone_response(plain, heat) * heat
+    share = network.convective.sum(axis=0)  # of small rooms 1.2 kW is more than their films are for
+    assert warmer.tolist() == (share < 0.0).tolist() and warmer.any() and not warmer.all()
 
 
 def test_a_wrong_clock_is_refused(building: Building, system: HvacSystem, scenario: Callable[..., Scenario]) -> None:
