@@ -79,7 +79,8 @@ def add_natural_convection(graph: GraphBuilder) -> None:
     """
     for room in (r for r in [*graph.anatomy.rooms.values()] if r.radiant >= 0 and not r.emitted):
         air = np.append(room.air, room.mean)
-        surface = sum(weight[np.isin(far, air)].sum() for _, _, far, weight in graph.touching(np.array([room.radiant])))
+        touching = graph.touching(np.array([room.radiant]))
+        surface = sum(weight[np.isin(far, air) & (far >= 0)].sum() for _, _, far, weight in touching)
         own = float(_AT_ONE_KELVIN * _DIFFERENCE**NATURAL * surface)
         convection = NaturalConvection(room.name, own)
         graph.anatomy.rooms[room.name], signal = replace(room, convection=convection), convection.signal
