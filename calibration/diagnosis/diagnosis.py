@@ -385,5 +385,4 @@ def baseline_gap(
     CalibrationError
         When an interval has no usable run.
     """
-    models = ModelComparison(case, ModelSettings(dx=dx), tune, hold_out, horizon)
-    return float(held_out(*fit_baseline(models, {})).mae)
+    return float(held_out(*fit_baseline(ModelComparison(case, ModelSettings(dx=dx), tune, hold_out, horizon), {})).mae)

@@ -43,6 +43,7 @@ _OUTSIDE: dict[str, Callable[[ca.SX], ca.SX]] = {
     "window_u_value": lambda u_value: u_value**2 / RATED_OUTSIDE_FILM,
 }
 
+
 def add_wind(graph: GraphBuilder) -> None:
     """Let the outside films of a complete baseline follow the wind.
 
@@ -77,13 +78,16 @@ def add_natural_convection(graph: GraphBuilder) -> None:
     graph : GraphBuilder
         The baseline without effects, with its emitters.
     """
-    for room in (r for r in [*graph.anatomy.rooms.values()] if r.radiant >= 0 and not r.emitted):
+    for room in list(graph.anatomy.rooms.values()):
+        if room.radiant < 0 or room.emitted:
+            continue
         air = np.append(room.air, room.mean)
         touching = graph.touching(np.array([room.radiant]))
         surface = sum(weight[np.isin(far, air) & (far >= 0)].sum() for _, _, far, weight in touching)
         own = float(_AT_ONE_KELVIN * _DIFFERENCE**NATURAL * surface)
         convection = NaturalConvection(room.name, own)
-        graph.anatomy.rooms[room.name], signal = replace(room, convection=convection), convection.signal
+        graph.anatomy.rooms[room.name] = replace(room, convection=convection)
+        signal = convection.signal
         graph.source(f"natural convection from the air of {room.name}", -1.0, room.air, signal, room.share)
         graph.source(f"natural convection to surfaces of {room.name}", 1.0, room.radiant, signal, 1.0)
 
