@@ -23,6 +23,9 @@ from mpc.live.audit import AuditLog
 ROOT = Path(__file__).parents[2]
 SET = "north/zone_air_heating_temperature_setpoint"
 
+#: Seconds of the site a second: a guard ends where a busy disk takes half a control step for a line of its log.
+RATE = 10.0
+
 
 def make(folder: Path, device: str = "127.0.0.1:9", mode: str = "act") -> Path:
     plant = {
@@ -32,7 +35,7 @@ def make(folder: Path, device: str = "127.0.0.1:9", mode: str = "act") -> Path:
         "actuators": {SET: {"signal": "y", "range": ["16 degC", "26 degC"]}},
     }  # fmt: skip
     site = {
-        "format": 1, "name": "hall", "plant": "plant.yaml", "controller": "full_speed", "clock_rate": 100.0,
+        "format": 1, "name": "hall", "plant": "plant.yaml", "controller": "full_speed", "clock_rate": RATE,
         "database": {"address": "postgresql:///none"},
         "connections": {"hall": {"kind": "bacnet", "address": device, "timeout": 0.5}},
         "points": {
@@ -87,7 +90,7 @@ def test_a_guard_of_the_command_gives_back_and_listens(
     pytest.importorskip("rusty_bacnet", reason="needs a BACnet device of another stack: pip install rusty-bacnet")
     pytest.importorskip("bacpypes3", reason="needs the extra [live]")
     script("_bacnet_device")
-    device = script("_bacnet_site").SimulatedSite(100.0)
+    device = script("_bacnet_site").SimulatedSite(RATE)
     path = make(tmp_path, device.start(), "advise")
     device.operate(1, 22.0, 13)  # what a guard left that was killed
     end = time.monotonic() + 60.0

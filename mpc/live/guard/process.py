@@ -83,7 +83,13 @@ class GuardProcess:
         return self._begin(state.modes, state.held | ordered) | {"state": state.to_dict()}
 
     async def run(self) -> int:
-        """Guard until it is ended; return the exit code."""
+        """Guard until it is ended; return the exit code.
+
+        Raises
+        ------
+        LiveError
+            When the log takes no more lines: everything was given back.
+        """
         self._pace.heed_signals()
         for link in self._links.values():
             await link.open()
@@ -94,7 +100,7 @@ class GuardProcess:
             for _ in range(2):
                 await self._order({}, list(self.rules.points))
             self._notifier.tell([f"the guard ends: {error}"], self.clock.wall())
-            return 1
+            raise
         finally:
             server.close()
             for link in self._links.values():

@@ -90,14 +90,15 @@ def test_films_that_follow_the_wind_are_kept_without_an_advance(
 ) -> None:
     monkeypatch.setattr(ladder, "ADVANCE", 1.0)  # nothing with more parameters is better by so much
     result = calibrate(case, settings={**QUICK, "climb": True})
-    assert [rung.chosen for rung in result.rungs] == [False, True, False, False]
+    assert [rung.name for rung in result.rungs] == ["drawn", "natural convection", "wind", "zoned", "lumped"]
+    assert [rung.chosen for rung in result.rungs] == [False, False, True, False, False]
     assert result.settings.structure.wind_films
     assert result.settings.normalisation is not None and result.settings.normalisation.wind is not None
     assert "outside films that follow the wind" in calibration_verdict(result)
     frame = hourly.telemetry.frame.drop(columns="weather_station/wind_speed_sensor")
     still = replace(hourly, telemetry=replace(hourly.telemetry, frame=frame), judged=None)
     names = [r.name for r in calibrate(still, settings={**QUICK, "climb": True}).rungs]
-    assert names[:3] == ["drawn", "zoned", "lumped"]
+    assert names[:4] == ["drawn", "natural convection", "zoned", "lumped"]
 
 
 def test_before_is_what_the_drawing_says(case: Case, climbed: CalibrationResult) -> None:
@@ -157,7 +158,7 @@ def test_a_gain_that_recurs_is_kept_where_it_predicts_better(case: Case, monkeyp
     further = recurring.parameters - lumped.parameters
     assert (recurring.name, further) == ("recurring", 6 * len(case.building.zone_names))
     assert 0.9 * lumped.left_out_mae < recurring.left_out_mae < 2.0 * lumped.left_out_mae
-    assert [rung.chosen for rung in result.rungs] == [False] * 4 + [True, False]
+    assert [rung.chosen for rung in result.rungs] == [False] * 5 + [True, False]
     assert result.settings.structure.recurring
     assert "recurs from day to day" in calibration_verdict(result)
     # with more freedom the days that were fitted are followed more closely
