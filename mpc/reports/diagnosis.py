@@ -239,9 +239,11 @@ def _values(result: Diagnosis, effect: str) -> list[str]:
     if effect not in CATALOGUE:
         return []
     own = {p.name for p in CATALOGUE[effect].parameters}
-    if effect == GAINS and (zones := result.final.effects.get(effect)):
+    zones = result.final.effects.get(effect, ())
+    if effect == GAINS and len(zones) == len(result.final.built.network.zones):
         return _courses({zone: daily_course(zone, result.final.values) for zone in zones})
-    found = [p for p in result.final.describe() if p.name.partition("@")[0] in own]
+    described, told = result.final.describe(), result.final.told
+    found = [p for p in described if p.name.partition("@")[0] in own and p.name in told]
     spelled = []
     for p in found[:_MOST_VALUES]:
         base, _, member = p.name.partition("@")

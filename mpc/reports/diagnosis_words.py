@@ -8,12 +8,14 @@ from calibration.diagnosis.decide.levels import LARGEST_GROUP
 from calibration.diagnosis.decide.verdict import Candidate, group_of
 from calibration.diagnosis.decide.where import Where
 from calibration.diagnosis.diagnosis import Diagnosis
-from calibration.diagnosis.refit.refit import WINDOWS, Refit
+from calibration.diagnosis.refit.refit import Refit
+from calibration.diagnosis.screen.seen import WINDOWS
 from mpc.reports.correction_words import correction_sentence, faults_sentence
 from mpc.reports.evaluation import beside_sentence, carried_sentence, structure_words
 from mpc.reports.free_words import comes_back, free_sentence, known_effects
 from mpc.reports.page import duration, estimated_sentences, kelvin, listed, percent, sure, watts
 from thermal.effects.catalogue import CATALOGUE, effect_of, is_effect
+from thermal.effects.gains import SWITCHED_HEAT
 from thermal.inputs.provider import IRRADIANCE
 
 #: What an effect is called where its title would read oddly after "leaves out".
@@ -250,8 +252,10 @@ def _how_far(result: Diagnosis, found: int) -> str:
     if result.verdict.name == "group" and len(rivals(result, accepted(result)[0].screened.effect)) > 1:
         them = "With the likeliest" + (" and the others" if found > 1 else "")
     there = f"{them} in the model, its error {ahead(result)}, on days that it was not fitted to,"
-    if WINDOWS in step.effects:
-        there = f"{there[:-1]} with windows open when the temperatures of these days show it, which no forecast knows,"
+    on = any(value > 0.0 for name, value in result.final.values.items() if name.partition("@")[0] == SWITCHED_HEAT)
+    if seen := [*["windows open"] * (WINDOWS in step.effects), *["equipment on"] * on]:
+        there = f"{there[:-1]} with {' and '.join(seen)} when the temperatures of these days show it,"
+        there += " which no forecast knows,"
     if step.after >= step.before:
         return (
             f"{there} does not fall: {kelvin(step.before)} K before, {kelvin(step.after)} K after. What the tuning "

@@ -73,7 +73,8 @@ class Effect:
     zonal : bool
         Whether it may be there in some zones only; it then has a strength a zone.
     courses : bool
-        Whether it has a course of its own in each zone that is named; without zones it follows a schedule everywhere.
+        Whether it is heat of its own in each zone that is named, or a course of its own where all are; without zones it
+        follows a schedule everywhere.
     alike : bool
         Whether one cause may give all zones one strength, such as cold water; valves leak one by one. A factor of all
         meters is a scale of all masses and conductances, which nothing but a known heater tells, and is not sought.

@@ -1,6 +1,7 @@
 """Heat of sun and people: sun through glass and on opaque walls, blinds, gains of people, latent load."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from operator import attrgetter
 
 import casadi as ca
@@ -10,7 +11,7 @@ from thermal._types import FloatArray
 from thermal.effects.effect import EffectBuilder, described, lacking
 from thermal.effects.weights import hat
 from thermal.inputs.provider import InputProvider
-from thermal.inputs.signals import CONSTANT, DAILY, Signal, daily_waves, on_plane
+from thermal.inputs.signals import CONSTANT, DAILY, Signal, daily_waves, on_plane, zone_signal
 from thermal.network.topology import Anatomy, Room
 
 #: Solar transmittance that a window is taken for where another's is known [-]: double glazing (EN 410).
@@ -18,6 +19,9 @@ _USUAL_TRANSMITTANCE = 0.6
 
 #: Irradiance on a facade at which blinds may be drawn [W/m2]: knots of the interpolation in between.
 _DRAWN_AT = (100.0, 200.0, 300.0, 400.0)
+
+#: Heat of a room's equipment that nobody meters: what is always on [W/m2], and what is switched on at times [W].
+EQUIPMENT, SWITCHED_HEAT = "equipment_gain", "switched_heat"
 
 PRESENCE = Signal("presence", "1", attrgetter("occupancy"), ("occupancy",))
 AT_HOME = Signal("presence at home", "1", attrgetter("at_home"), ("at_home",))
@@ -71,14 +75,15 @@ def _build_opaque(builder: EffectBuilder) -> None:
         builder.graph.source(builder.key(), absorptance * faces.value / look.film, faces.node, signal, faces.area)
 
 
-def _give_half_to_air(builder: EffectBuilder, room: Room, value: ca.SX, signal: Signal) -> None:
-    builder.heat_air(room, value, signal, 0.5 * room.floor_area)
-    builder.heat_surfaces(room, value, signal, 0.5 * room.floor_area)
+def _give_half_to_air(builder: EffectBuilder, room: Room, value: ca.SX, signal: Signal, area: float) -> None:
+    builder.heat_air(room, value, signal, 0.5 * area)
+    builder.heat_surfaces(room, value, signal, 0.5 * area)
 
 
 def _build_people(builder: EffectBuilder) -> None:
     if builder.named:
-        _build_courses(builder)
+        everywhere = len(builder.rooms) == len(builder.anatomy.rooms)
+        (_build_courses if everywhere else _build_equipment)(builder)
         return
     names = ("internal_gain", "internal_gain_delay", "internal_gain_at_home", "base_load")
     peak, shift, home, base = (builder.parameter(n) for n in names)
@@ -88,7 +93,7 @@ def _build_people(builder: EffectBuilder) -> None:
     for value, signal in ((peak, PRESENCE), (-peak * shift, arrival), (home, AT_HOME), (base, CONSTANT)):
         for room in builder.rooms:
             own = value if room.name in builder.anatomy.served else value * elsewhere
-            _give_half_to_air(builder, room, own, signal)
+            _give_half_to_air(builder, room, own, signal, room.floor_area)
 
 
 def _build_courses(builder: EffectBuilder) -> None:
@@ -97,7 +102,20 @@ def _build_courses(builder: EffectBuilder) -> None:
         heat = [(builder.parameter("internal_gain_mean", zone=room.name), CONSTANT)]
         heat += [(builder.parameter("internal_gain_wave", zone=f"{room.name}, {w.name}"), w) for w in DAILY]
         for value, signal in heat:
-            _give_half_to_air(builder, room, value, signal)
+            _give_half_to_air(builder, room, value, signal, room.floor_area)
+
+
+def _build_equipment(builder: EffectBuilder) -> None:
+    """Let some rooms have heat that is always on, and heat that is switched, each."""
+    for room in builder.rooms:
+        _give_half_to_air(builder, room, builder.parameter(EQUIPMENT, zone=room.name), CONSTANT, room.floor_area)
+    _build_switched(builder)
+
+
+def _build_switched(builder: EffectBuilder) -> None:
+    for room in builder.rooms:
+        on = zone_signal(f"heat seen on in {room.name}", "1", "switched", room.name)
+        _give_half_to_air(builder, room, builder.parameter(SWITCHED_HEAT, zone=room.name), on, 1.0)
 
 
 def daily_course(zone: str, values: Mapping[str, float]) -> FloatArray:
@@ -140,4 +158,6 @@ SOLAR_GAIN = described("solar_gain", _build_gain, _no_panes)
 BLINDS = described("blinds", _build_blinds, _no_panes)
 SOLAR_OPAQUE = described("solar_opaque", _build_opaque, _no_walls)
 INTERNAL_GAINS = described("internal_gains", _build_people)
+#: What is switched in some rooms alone, for a screening.
+SWITCHED = replace(INTERNAL_GAINS, build=_build_switched)
 LATENT_LOAD = described("latent_load", _build_latent)

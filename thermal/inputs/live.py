@@ -52,3 +52,4 @@ class LiveInputs(InputProvider):
             self.__dict__.pop(name, None)  # what was made of the last row
         self.stamps, self.series = stamp, row
         self.openings = np.zeros((1, len(self.zones)))
+        self.switched = np.zeros_like(self.openings)

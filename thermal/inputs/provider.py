@@ -49,7 +49,7 @@ _LEAST_ESTIMATED = 172800.0
 #: Inputs with their units; a ``_rate`` is a change by the hour, of several stamps.
 INPUTS: dict[str, str] = {
     "outdoor": "K", "wind": "m/s", "sky": "W/m^2", "sun": "W/m^2", "occupancy": "1", "at_home": "1", "usual": "K",
-    "openings": "1", "through_windows": "K*m/s", "heat": "W", "airflow": "kg/s", "supply_flow": "kg/s",
+    "openings": "1", "switched": "1", "through_windows": "K*m/s", "heat": "W", "airflow": "kg/s", "supply_flow": "kg/s",
     "supply_heat": "W", "radiant_gains": "W", "outdoor_rate": "K/h", "occupancy_rate": "1/h", "heat_rate": "W/h",
     "commanded": "1", "emitted": "W", "emitted_rate": "W/h",
 }  # fmt: skip
@@ -62,7 +62,7 @@ HVAC_INPUTS = frozenset(
 #: Series that inputs are made of where these are not of the same name.
 _SERIES: dict[str, tuple[str, ...]] = {
     "wind": (WIND,), "sky": (INFRARED, "outdoor"), "sun": (IRRADIANCE,), "through_windows": ("outdoor",),
-    "occupancy": (), "at_home": (), "usual": (), "openings": (),
+    "occupancy": (), "at_home": (), "usual": (), "openings": (), "switched": (),
 }  # fmt: skip
 
 
@@ -106,6 +106,8 @@ class InputProvider:
     openings : ndarray, shape (n_time, n_zone)
         Whether a window of each zone is seen to stand open: 1 where one is. Telemetry has no window contacts: windows
         are shut unless a diagnosis sees what they let out, and sets this.
+    switched : ndarray, shape (n_time, n_zone)
+        Whether heat that nobody meters is seen to be on in each zone: 1 while it is, set in the same way.
     """
 
     def __init__(
@@ -120,6 +122,7 @@ class InputProvider:
         self.building, self.zones, self.step, self.source = building, building.zone_names, float(step), source
         self.stamps, self.series, self.normalisation = stamps, series, normalisation
         self.openings = np.zeros((len(stamps), len(self.zones)))
+        self.switched = np.zeros_like(self.openings)
 
     def __repr__(self) -> str:
         known = [name for name in INPUTS if self.gives(name)]

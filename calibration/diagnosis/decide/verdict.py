@@ -272,7 +272,7 @@ def _parameters(best: Gain | Refit, effect: str) -> dict[str, Estimate]:
             told[name] = Estimate(value, kind.unit, (low, high))
         return told
     for p, z, spread in zip(best.fit.problem.parameters, best.fit.found.point, best.fit.deviations, strict=True):
-        if p.effect == effect:
+        if p.effect == effect and p.name in best.fit.told:
             low, high = (float(np.clip(p.inverse(z + s * _NINETY * spread), p.lower, p.upper)) for s in (-1.0, 1.0))
             told[p.name] = Estimate(float(p.inverse(z)), p.unit, (low, high))
     return told

@@ -95,7 +95,7 @@ def _zoned(models: ModelComparison, drawn: Collection[str]) -> Iterator[ModelCom
         if scopes:
             settings = replace(models.settings, scopes={**own, **scopes})
             zoned = replace(models, settings=settings, tune=models.tuned, hold_out=models.judged)
-            zoned.drivers = copy(models.drivers)  # a search may find other openings about it
+            zoned.drivers = copy(models.drivers)  # a search may see other windows open about it
             yield zoned
 
 

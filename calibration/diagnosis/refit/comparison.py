@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from calibration.diagnosis.refit.fit import Found, evidence_of, solve
-from calibration.diagnosis.screen.openings import seen_openings
+from calibration.diagnosis.screen.seen import seen_at_first
 from calibration.errors import NotEnoughDataError
 from calibration.evaluation import intervals
 from calibration.evaluation.intervals import Interval, horizon_steps
@@ -94,6 +94,10 @@ def is_strength(name: str, effect: str | None) -> bool:
     kinds = {p.name: p for p in effect_of(effect).parameters} if is_effect(effect) else {}
     kind = kinds.get(name.partition("@")[0])
     return kind is None or (kind.scale == "linear" and kind.start == 0.0 and kind.name not in _SHIFTS)
+
+
+#: Share of its prior deviation from which a parameter's standard error says that the data tell nothing of it [-].
+_UNTOLD = 0.999
 
 
 @dataclass(frozen=True)
@@ -184,6 +188,12 @@ class Fit:
                 beyond[p.member] = max(beyond.get(p.member, 0.0), float(abs(z)) / deviation)
         return beyond
 
+    @property
+    def told(self) -> frozenset[str]:
+        """Names of the parameters of which the data tell anything: they are surer than before."""
+        both = zip(self.problem.parameters, self.deviations.tolist(), strict=True)
+        return frozenset(p.name for p, deviation in both if deviation < _UNTOLD * p.prior_deviation)
+
     @cached_property
     def values(self) -> dict[str, float]:
         """Parameters by name [parameter units]."""
@@ -271,9 +281,9 @@ class ModelComparison:
 
     @cached_property
     def drivers(self) -> InputProvider:
-        """Sun, sky, wind and schedules of the case, and when windows are seen to stand open."""
+        """Sun, sky, wind and schedules of the case, and when windows are seen to stand open, or heat to be on."""
         drivers = telemetry_inputs(self.case, fit_normalisation(self.case, ((i.start, i.end) for i in self.tuned)))
-        drivers.openings = seen_openings(self.case, drivers, self.settings)
+        seen_at_first(self.case, drivers, self.settings).give(drivers)
         return drivers
 
     @cached_property

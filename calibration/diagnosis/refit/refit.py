@@ -12,8 +12,8 @@ import pandas as pd
 
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.diagnosis.screen.gains import MATTERS, Gain, choice_of
-from calibration.diagnosis.screen.openings import openings_beyond
 from calibration.diagnosis.screen.screen import Screening
+from calibration.diagnosis.screen.seen import WINDOWS, seen_beyond
 from calibration.errors import CalibrationError
 from calibration.fit.problem import Problem
 from thermal._types import FloatArray, IntArray
@@ -39,9 +39,6 @@ ACCEPTED = 6.0
 #: Held-out mean absolute error over the root mean square of the tuning errors above which they are errors of other
 #: days [-]; 0.7 is usual.
 _ELSEWHERE = 1.2
-
-#: The effect whose signal is seen and not measured.
-WINDOWS = "window_opening"
 
 #: Most times that a round looks again.
 _LOOKS = 2
@@ -301,7 +298,7 @@ def look_again(work: Work, gains: Sequence[Gain], refits: Sequence[Refit], best:
     exposed = {p.member for p in work.made.parameters if p.effect == WINDOWS}
     fit = best.fit
     for _ in range(_LOOKS):
-        opened = openings_beyond(fit.built.grid, _without(fit, own), drivers, fit.built.inputs)
+        opened = seen_beyond(fit.built.grid, _without(fit, own), drivers, fit.built.inputs).openings
         zones = tuple(z for k, z in enumerate(drivers.zones) if z in exposed and opened[:, k].any())
         if not zones or np.array_equal(opened, drivers.openings):
             break

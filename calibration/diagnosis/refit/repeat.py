@@ -66,9 +66,10 @@ def agreement(fit: Fit) -> dict[str, Repeats]:
     apart, covariance = one - other, spread + spread_of_other
     found, thetas = {}, [problem.theta(point) for point in (one, other)]
     for effect in fit.effects:
-        own = [i for i, p in enumerate(problem.parameters) if p.effect == effect and is_strength(p.name, effect)]
+        strengths = (i for i, p in enumerate(problem.parameters) if p.effect == effect and is_strength(p.name, effect))
+        own = [i for i in strengths if covariance[i, i] > 0.0]  # of the others no half tells anything
         block = covariance[np.ix_(own, own)] + 1e-12 * np.eye(len(own))
-        chance = float(chi2.sf(apart[own] @ np.linalg.solve(block, apart[own]), len(own)))
+        chance = float(chi2.sf(apart[own] @ np.linalg.solve(block, apart[own]), len(own))) if own else 1.0
         first, second = ({problem.parameters[i].name: float(t[problem.free[i]]) for i in own} for t in thetas)
         found[effect] = Repeats(chance, (first, second))
     return found

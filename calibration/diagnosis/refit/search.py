@@ -14,14 +14,13 @@ import numpy as np
 
 from calibration.diagnosis.decide.levels import APART
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
-from calibration.diagnosis.refit.refit import ACCEPTED, WINDOWS, HeldOut, Refit, Work, look_again, promising
+from calibration.diagnosis.refit.refit import ACCEPTED, HeldOut, Refit, Work, look_again, promising
 from calibration.diagnosis.screen.gains import Gain
-from calibration.diagnosis.screen.openings import openings_beyond
 from calibration.diagnosis.screen.own_nulls import OwnNulls, own_nulls
 from calibration.diagnosis.screen.screen import Screening, screen
+from calibration.diagnosis.screen.seen import WINDOWS, Seen, look
 from calibration.progress import Forward, Progress
 from calibration.stages import stage
-from thermal._types import FloatArray
 from thermal.effects.catalogue import CATALOGUE
 from thermal.effects.effect import ALIKE
 
@@ -144,31 +143,31 @@ def search(
     progress : callable, optional
         Called with stage, done, total.
     """
-    whole, sought = Forward(progress), _Sought((), baseline, errors, models.drivers.openings)
+    whole, sought = Forward(progress), _Sought((), baseline, errors, Seen.of(models.drivers))
     while not sought.over and len(sought.done) < ROUNDS:
         number = len(sought.done) + 1
         part = whole.part(_SHARE, f"round {number}")
-        sought = stage(f"round {number}", partial(_with_openings, models, sought, candidates, part))
-        models.drivers.openings = sought.openings  # of a round that was done before an interruption, too
+        sought = stage(f"round {number}", partial(_with_seen, models, sought, candidates, part))
+        sought.seen.give(models.drivers)  # of a round that was done before an interruption, too
     return sought.done
 
 
 @dataclass(frozen=True)
 class _Sought:
-    """Where the search is: rounds done, the model that the next begins with, its held-out errors, and open windows."""
+    """Where the search is: rounds done, the model that the next begins with, its held-out errors, and what is seen."""
 
     done: tuple[Round, ...]
     fit: Fit
     errors: HeldOut
-    openings: FloatArray
+    seen: Seen
     ahead: Refit | None = None
     own: OwnNulls | None = None
     over: bool = False
 
 
-def _with_openings(models: ModelComparison, sought: _Sought, candidates: Sequence[str], part: Progress) -> _Sought:
-    """Do a round, and tell when windows are seen to stand open after it."""
-    return replace(_next_round(models, sought, candidates, part), openings=models.drivers.openings)
+def _with_seen(models: ModelComparison, sought: _Sought, candidates: Sequence[str], part: Progress) -> _Sought:
+    """Do a round, and tell when windows are seen to stand open, and heat to be on, after it."""
+    return replace(_next_round(models, sought, candidates, part), seen=Seen.of(models.drivers))
 
 
 def _next_round(models: ModelComparison, sought: _Sought, candidates: Sequence[str], part: Progress) -> _Sought:
@@ -176,8 +175,7 @@ def _next_round(models: ModelComparison, sought: _Sought, candidates: Sequence[s
     done, fit, errors, ahead, own = sought.done, sought.fit, sought.errors, sought.ahead, sought.own
     part("screening", 0, 1)
     open_ = [e for e in candidates if all(r in fit.effects for r in CATALOGUE[e].requires)]
-    if WINDOWS in open_ and WINDOWS not in (fit if ahead is None else ahead.fit).effects:
-        models.drivers.openings = openings_beyond(fit.built.grid, fit.theta, models.drivers, fit.built.inputs)
+    look(fit.built.grid, fit.theta, models.drivers, fit.built.inputs, (fit if ahead is None else ahead.fit).effects)
     made, gains, generic = screen(models, fit, open_)
     if own is not None:
         made.jacobian = None
@@ -268,11 +266,13 @@ def _refits(work: Work, gains: Sequence[Gain], ahead: Refit | None) -> list[Refi
     if best is not None and best.screened.zones:
         fitted = {r.screened.effect for r in found} | {WINDOWS}  # these are sought anew, not only fitted: `look_again`
         for g in gains:
-            there_too = CATALOGUE[g.effect].alike if best.screened.zones == ALIKE else CATALOGUE[g.effect].zonal
+            there_too = CATALOGUE[g.effect].alike if best.screened.zones == ALIKE else CATALOGUE[g.effect].takes_zones
             confounded = g.effect in CATALOGUE[best.screened.effect].confounders
             # tangents at no strength may miss where it is, or what it does
             if confounded and there_too and g.effect not in fitted:
-                other = work.refit([replace(g, zones=best.screened.zones)], work.accepted)
+                chosen = best.screened
+                there = replace(g, zones=chosen.zones, places=max(g.places, chosen.places))
+                other = work.refit([there], work.accepted)
                 found.extend([] if other is None else [other])
     return sorted(found, key=lambda r: -r.gain)
 

@@ -128,7 +128,7 @@ def own_nulls(made: Screening, fit: Fit, candidates: Sequence[str]) -> OwnNulls:
 
 def _gains_of(made: Screening, effect: str, scores: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Gain and share of one effect in every draw: over the building or zones, as `Screening.of` has it [-]."""
-    if not CATALOGUE[effect].zonal:
+    if not CATALOGUE[effect].takes_zones:
         whole = made.programme.solve(made.strengths_of(effect), scores)
         return whole.gain, whole.share
     members, everywhere = made.members_of(effect)

@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison, is_strength
+from calibration.diagnosis.screen.equipment import EQUIPPED, always_on, at_times
 from calibration.diagnosis.screen.gains import Gain, choice_of
 from calibration.diagnosis.screen.generic import GENERIC, TIGHTNESS, ZONE_HEAT
 from calibration.diagnosis.screen.programme import Programme
@@ -53,8 +54,10 @@ class Screening:
     def __init__(self, models: ModelComparison, fit: Fit, candidates: Sequence[str]) -> None:
         here = _worst_zones(fit)
         lacking = {e: here if CATALOGUE[e].zonal else () for e in candidates if e not in fit.effects}
-        built = models.build({**fit.effects, **lacking}, (Chosen(GENERIC, here),))
-        self.elsewhere = len(built.network.zones) - len(here) if here else 0
+        switched = at_times(models.drivers, here) if EQUIPPED in lacking else []
+        built = models.build({**fit.effects, **lacking}, (Chosen(GENERIC, here), *switched))
+        self._zones = len(built.network.zones)
+        self.elsewhere = self._zones - len(here) if here else 0
         own: tuple[Parameter, ...] = built.network.parameters
         self._levels = {p.effect: p for p in own if p.effect in lacking and p.name == CATALOGUE[p.effect].level}
         levels = {p.name: (p.lower, p.upper) for p in self._levels.values()}
@@ -71,10 +74,13 @@ class Screening:
             jacobian = np.column_stack([jacobian, jacobian[:, i] + (high - low) / little[i]])
         self._twins = {len(own) + k: i for k, i in enumerate(twice)}
         tied = {} if here else _tied(own, [e for e in lacking if CATALOGUE[e].alike])
+        alone = always_on(own) if EQUIPPED in lacking else {}
         self._tied = range(len(own) + len(twice), len(own) + len(twice) + len(tied))
-        jacobian = np.column_stack([jacobian, *(jacobian[:, mine].sum(axis=1) for mine in tied.values())])
+        jacobian = np.column_stack(
+            [jacobian, *(jacobian[:, mine].sum(axis=1) for mine in tied.values()), jacobian[:, list(alone.values())]]
+        )
         at_the_end = (replace(own[i], name=f"{own[i].name} at the other end") for i in twice)
-        self.parameters = (*own, *at_the_end, *tied)
+        self.parameters = (*own, *at_the_end, *tied, *alone)
         self.jacobian = jacobian
         error = fit.problem.residuals_only(fit.model, fit.theta)
         self.count = problem.effective_size()
@@ -85,7 +91,7 @@ class Screening:
         self.lower = np.array([p.lower for p in self.parameters])
         self.upper = np.array([p.upper for p in self.parameters])
         self._start = np.array([p.transform(p.start) for p in self.parameters])
-        self._point = np.concatenate([problem.point(theta), np.zeros(len(twice) + len(tied))])
+        self._point = np.concatenate([problem.point(theta), np.zeros(len(twice) + len(tied) + len(alone))])
         self._whole, self._slope = gram, score
         self._project(np.array([p.name in fit.values for p in self.parameters]))
 
@@ -162,10 +168,12 @@ class Screening:
         effect : str
             Its id.
         """
-        if not CATALOGUE[effect].zonal:
+        if not CATALOGUE[effect].takes_zones:
             return [self._gain(effect, self.strengths_of(effect), ())]
         members, everywhere = self.members_of(effect)
         found = [self._grow(effect, members)] if members else []
+        if CATALOGUE[effect].courses:  # in all zones it is another
+            found = [way for way in found if len(way.zones) < self._zones]
         found += [self._gain(effect, index, zones) for zones, index in everywhere.items()]
         return sorted(found, key=lambda g: -g.gain)
 

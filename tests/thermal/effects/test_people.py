@@ -57,15 +57,24 @@ def test_there_is_no_share_where_every_zone_is_served_or_no_device_says_which(bu
 
 
 def test_rooms_that_are_named_have_hours_of_their_own(building: Building) -> None:
-    network = build_network(building, effects=chosen({"internal_gains": ["A"]}))
+    network = build_network(building, effects=chosen({"internal_gains": ["A", "B"]}))
     names = [p.name for p in network.parameters if p.effect]
-    assert len(names) == 7 and {name.partition("@")[2].partition(",")[0] for name in names} == {"A"}
+    assert len(names) == 14 and {name.partition("@")[2].partition(",")[0] for name in names} == {"A", "B"}
     assert {p.effect for p in network.parameters if p.effect} == {"internal_gains"}
     given = {"internal_gain_mean@A": 4.0, "internal_gain_wave@A, cos of 12 h": 2.0}
     for signal, strength in (("constant", 4.0), ("cos of 12 h", 2.0)):
         assert heat_by_zone(network, signal, **given) == pytest.approx({"A": strength * FLOOR["A"], "B": 0.0}, rel=1e-9)
     assert daily_course("A", given)[[0, 3, 6, 9, 12]] == pytest.approx([6.0, 4.0, 2.0, 4.0, 6.0])
     assert not daily_course("B", given).any()
+
+
+def test_some_rooms_that_are_named_have_equipment(building: Building) -> None:
+    network = build_network(building, effects=chosen({"internal_gains": ["A"]}))
+    assert [p.name for p in network.parameters if p.effect] == ["equipment_gain@A", "switched_heat@A"]
+    heat = heat_by_zone(network, "constant", **{"equipment_gain@A": 4.0})
+    assert heat == pytest.approx({"A": 4.0 * FLOOR["A"], "B": 0.0}, rel=1e-9)
+    heat = heat_by_zone(network, "heat seen on in A", **{"switched_heat@A": 900.0})
+    assert heat == pytest.approx({"A": 900.0, "B": 0.0}, rel=1e-9)
 
 
 def test_moisture_is_seen_by_what_cools_the_air(unserved: Building) -> None:

@@ -11,10 +11,11 @@ import pytest
 from numpy.typing import NDArray
 
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
-from calibration.diagnosis.refit.refit import WINDOWS, Refit, Work, held_out, look_again
+from calibration.diagnosis.refit.refit import Refit, Work, held_out, look_again
 from calibration.diagnosis.refit.search import search
 from calibration.diagnosis.screen.gains import Gain
 from calibration.diagnosis.screen.screen import screen
+from calibration.diagnosis.screen.seen import WINDOWS
 from calibration.evaluation.settings import ModelSettings
 from thermal import Case, Telemetry
 from thermal.inputs.provider import telemetry_inputs

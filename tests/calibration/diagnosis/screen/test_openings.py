@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from calibration.diagnosis.screen.openings import _most_likely_paths, _noise, _opened_when
+from calibration.diagnosis.screen.openings import opened_when
+from calibration.diagnosis.screen.two_states import most_likely_paths, noise_of
 from calibration.estimation.heat_balance import heat_balance, step_balance
 from calibration.evaluation.intervals import Interval
 from thermal import SymbolicModel, build_network, load_bundled_case, reduced_model, replay_inputs
@@ -39,7 +40,7 @@ UNIT = 1200.0 + 400.0 * np.sin(2.0 * np.pi * (np.arange(DAYS * DAY) - 100) / DAY
 
 def found_in(*heat: FloatArray) -> FloatArray:
     """Openings of zones whose windows let out alike, shape (n_time, n_zone)."""
-    return _opened_when(np.column_stack(heat), np.tile(UNIT[:, None], len(heat)), PRESENCE, STEP)
+    return opened_when(np.column_stack(heat), np.tile(UNIT[:, None], len(heat)), PRESENCE, STEP)
 
 
 @pytest.mark.parametrize("area", [0.5, 1.0, 3.0])
@@ -69,10 +70,10 @@ def test_noise_is_that_of_heat_that_no_window_loses(sign: float) -> None:
     """However long windows stand open, in the cold and where it is warmer outdoor."""
     rng = np.random.default_rng(9)
     unit, quiet = sign * UNIT, 70.0 * rng.standard_normal(UNIT.size)
-    assert _noise(quiet, unit) == pytest.approx(70.0, rel=0.05)
+    assert noise_of(quiet, unit) == pytest.approx(70.0, rel=0.05)
     state = (rng.uniform(size=unit.size) < 0.2).astype(float)
-    assert _noise(quiet + 2.0 * state * unit, unit) == pytest.approx(70.0, rel=0.05)
-    assert _noise(np.zeros(3), unit[:3]) > 0.0
+    assert noise_of(quiet + 2.0 * state * unit, unit) == pytest.approx(70.0, rel=0.05)
+    assert noise_of(np.zeros(3), unit[:3]) > 0.0
 
 
 def test_noise_a_slow_loss_and_a_steady_one_are_no_openings() -> None:
@@ -102,7 +103,7 @@ def test_the_path_is_the_most_likely_of_all() -> None:
         return total
 
     best = max(product((0, 1), repeat=9), key=value)
-    paths, gains = _most_likely_paths(np.column_stack([odds, np.full(9, -5.0)]), opens, shuts)
+    paths, gains = most_likely_paths(np.column_stack([odds, np.full(9, -5.0)]), opens, shuts)
     assert tuple(paths[:, 0].astype(int)) == best
     assert gains == pytest.approx([value(best) - value((0,) * 9), 0.0])
     assert not paths[:, 1].any()

@@ -1,0 +1,84 @@
+"""Heat that is switched on and off in a zone: a stove, a machine, a heater that nobody meters.
+
+Such heat comes at a stroke, for a part of the day, at no hour of its own and in its own zone alone. What a model does
+wrong comes by the clock, as set-backs do, and in many zones at a time.
+"""
+
+import numpy as np
+
+from calibration.diagnosis.screen.two_states import log_odds, most_likely_paths, noise_of, sudden_part
+from thermal._types import BoolArray, FloatArray
+
+#: What changes slower is not switched [h].
+_SLOW = 24.0
+
+#: How often heat is switched on, and off again [1/h].
+_ON, _OFF = 1.0 / 24.0, 1.0 / 4.0
+
+#: Powers that it may have [W].
+_POWERS = np.geomspace(100.0, 6000.0, 14)
+
+#: Gain in log-likelihood from which it is there, the most of the time that it may last, and its least size over the
+#: noise of its zone [-]. Stoves in offices of a maker of its own gain from 700 on and have 2.9 and more of the noise;
+#: nulls of these offices and of our own have 160 at most.
+_SEEN, _LONGEST, _CLEAR = 400.0, 0.4, 2.5
+
+#: Most of its course that the hour of the day may tell, and of its time that another zone may share [-]: stoves have up
+#: to 0.08 and 0.19; what a wrong model needs by the clock, more.
+_BY_CLOCK, _SHARED = 0.15, 0.25
+
+
+def switched_when(brought: FloatArray, step: float) -> FloatArray:
+    """When heat of a zone is on that its model does not know; never where it does not look switched.
+
+    Parameters
+    ----------
+    brought : ndarray, shape (n_time, n_zone)
+        Heat that the zones' model needs less that which is metered [W]; NaN where it is not known.
+    step : float
+        Of the telemetry [s].
+
+    Returns
+    -------
+    ndarray, shape (n_time, n_zone)
+        1 while it is on [-].
+    """
+    hour, known = max(1.0, 3600.0 / step), np.isfinite(brought)
+    sudden, on = sudden_part(brought, known, _SLOW, step), np.zeros(brought.shape)
+    sought = np.flatnonzero(known.sum(axis=0) >= 24 * hour)
+    if not sought.size:
+        return on
+    alike = np.ones(len(brought))
+    noise = np.array([noise_of(sudden[known[:, k], k], alike[known[:, k]]) for k in sought])
+    odds = [log_odds(sudden[:, k], known[:, k], alike, _POWERS, n) for k, n in zip(sought, noise, strict=True)]
+    begins, ends = np.full(len(brought), _ON / hour), min(_OFF / hour, 0.5)
+    paths, gains = most_likely_paths(np.hstack(odds), begins, ends)
+    paths, gains = paths.reshape(len(brought), sought.size, -1), gains.reshape(sought.size, -1)
+    gains = np.where(paths.mean(axis=0) < _LONGEST, gains, -np.inf)
+    best = np.argmax(gains, axis=1)
+    every = np.arange(sought.size)
+    likely, courses = gains[every, best], paths[:, every, best]
+    for k, zone in enumerate(sought):
+        course, own = courses[:, k] > 0.0, sudden[:, zone]
+        if likely[k] > _SEEN and own[course].mean() - own[~course].mean() > _CLEAR * noise[k]:
+            others = np.delete(courses, k, axis=1) > 0.0
+            if _told_by_clock(courses[:, k], step) < _BY_CLOCK and _shared(course, others) < _SHARED:
+                on[:, zone] = courses[:, k]
+    return on
+
+
+def _told_by_clock(course: FloatArray, step: float) -> float:
+    """Share of a course's variance that the mean of all other days at the hour tells [-]."""
+    steps = max(1, round(86400.0 / step))
+    days = course[: len(course) // steps * steps].reshape(-1, steps)
+    if len(days) < 2:
+        return 1.0
+    others, hour = (days.sum(axis=0) - days) / (len(days) - 1), max(1, round(3600.0 / step))
+    told = np.array([np.convolve(day, np.full(hour, 1.0 / hour), "same") for day in others])
+    return float(1.0 - ((days - told) ** 2).sum() / max(((days - days.mean()) ** 2).sum(), 1e-12))
+
+
+def _shared(course: BoolArray, others: BoolArray) -> float:
+    """Time that a course has in common with another over that of either, the most of all others [-]."""
+    both, either = (np.sum(f(course[:, None], others), axis=0) for f in (np.logical_and, np.logical_or))
+    return float(np.max(both / np.maximum(either, 1), initial=0.0))
