@@ -242,8 +242,8 @@ def _values(result: Diagnosis, effect: str) -> list[str]:
     zones = result.final.effects.get(effect, ())
     if effect == GAINS and len(zones) == len(result.final.built.network.zones):
         return _courses({zone: daily_course(zone, result.final.values) for zone in zones})
-    described, told = result.final.describe(), result.final.told
-    found = [p for p in described if p.name.partition("@")[0] in own and p.name in told]
+    known = result.final.told
+    found = [p for p in result.final.describe() if p.name.partition("@")[0] in own and p.name in known]
     spelled = []
     for p in found[:_MOST_VALUES]:
         base, _, member = p.name.partition("@")
