@@ -1,4 +1,4 @@
-"""The baseline of a diagnosis: as drawn, with films and emitters by the evidence where the case does not say them."""
+"""The baseline of a diagnosis: as drawn, with films, contents and emitters by the evidence, which no case says."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -11,13 +11,17 @@ from calibration.fit.left_out import values_of
 from calibration.progress import Progress
 
 
+#: Parts of a structure that drawings do not tell and no reading does, in the order in which they are tried.
+_NEARER = ("natural_films", "light_contents")
+
+
 def fit_baseline(
     models: ModelComparison, effects: Mapping[str, Sequence[str]], progress: Progress | None = None
 ) -> tuple[ModelComparison, Fit]:
-    """Fit the baseline, with inside films that follow the heat if that is likelier, and emitters by left-out days.
+    """Fit the baseline, with films that follow heat and light contents if these are likelier, emitters by left-out days.
 
-    Natural convection needs no parameter: evidence decides, once it is strong. In buildings of more than 40 zones it is
-    left out. Heated floors or radiators are taken if left-out tuning days say so.
+    Natural convection needs no parameter, and things that follow the air within minutes one: evidence decides, once it is
+    strong. In buildings of more than 40 zones both are left out. Heated floors or radiators are taken if left-out tuning days say so.
 
     Parameters
     ----------
@@ -36,12 +40,14 @@ def fit_baseline(
     known = {name: tuple(zones) for name, zones in effects.items()}
     found = models.fit(known, [{}])
     if not is_large(models.case.building.zone_names) and not models.settings.structure.lumped:
-        structure = replace(models.settings.structure, natural_films=True)
-        convective = replace(models, settings=replace(models.settings, structure=structure))
-        convective.drivers = models.drivers
-        follows = any(room.convection is not None for room in convective.anatomy.rooms.values())
-        if follows and (other := convective.fit(known, [found.values])).evidence > found.evidence + APART:
-            models, found = convective, other
+        for name in _NEARER:
+            structure = replace(models.settings.structure, **{name: True})
+            nearer = replace(models, settings=replace(models.settings, structure=structure))
+            nearer.drivers = models.drivers
+            if name == "natural_films" and all(r.convection is None for r in nearer.anatomy.rooms.values()):
+                continue
+            if (other := nearer.fit(known, [found.values])).evidence > found.evidence + APART:
+                models, found = nearer, other
     heated = fit_emitter(found.known, models, known, progress)
     if heated is None:
         return models, found

@@ -56,10 +56,12 @@ _EMITTERS: tuple[Unknown, Unknown] = ("floor", "radiator")
 #: Tuning days from which a gain that recurs from day to day is looked for [days]: it has to recur.
 _WEEK = 7.0
 
-#: Films that follow something, by the name of the structure: what they follow, and what has them do so.
-_FILMS: dict[str, tuple[str, Callable[[Structure], Structure]]] = {
-    "natural convection": ("heat", lambda structure: replace(structure, natural_films=True)),
-    "wind": ("wind", lambda structure: replace(structure, wind_films=True)),
+#: What no drawing tells, by the name of the structure: what must be known, what the structure then has, and the share by
+#: which it must do better [-]: films that follow something have no more parameters, contents have one.
+_UNDRAWN: dict[str, tuple[str, Callable[[Structure], Structure], float]] = {
+    "natural convection": ("heat", lambda structure: replace(structure, natural_films=True), 0.0),
+    "light contents": ("heat", lambda structure: replace(structure, light_contents=True), _MOVED),
+    "wind": ("wind", lambda structure: replace(structure, wind_films=True), 0.0),
 }
 
 #: Structures without a drawing.
@@ -188,8 +190,8 @@ def climb_from(
 ) -> tuple[tuple[Rung, ...], FittedCase | None, LeftOut]:
     """Fit further structures beside a fitted model; the simplest is kept that predicts left-out days about best.
 
-    With heat that radiates, or that floors give, where the case does not say what heaters give it by; with outside
-    films that follow the wind, and with slabs and furniture by zone (outer walls and windows too, where the drawing is
+    With heat that radiates, or that floors give, where the case does not say what heaters give it by; with inside films
+    that follow the heat, contents that follow the air, outside films that follow the wind, and with slabs and furniture by zone (outer walls and windows too, where the drawing is
     no survey), unless a lumped model halves the drawing's error;
     lumped, where the sun is a part of it, by an estimate if irradiance is not measured; lumped, with a gain that recurs
     from day to day, which is linear, so that a few Newton steps from the lumped estimate tell whether it is worth a
@@ -236,13 +238,14 @@ def climb_from(
     free = ladder.lumped(Structure(lumped=True, sun=source.gives("sun")), looked[best].left.mae)
     drawn = min(each.left.mae for each in free) >= _WRONG * looked[best].left.mae
     least = looked[best].left.mae
-    for name, (signal, followed) in _FILMS.items() if plain and drawn else ():
-        follows = replace(base, structure=followed(base.structure))
+    for name, (signal, other, better) in _UNDRAWN.items() if plain and drawn else ():
+        follows = replace(base, structure=other(base.structure))
         if follows.structure != base.structure and source.gives(signal):
             begins = _begun(given, follows, fitted)
-            if len(begins.problem.grid.network.signals) == len(fitted.problem.grid.network.signals):
+            networks = [each.problem.grid.network for each in (begins, fitted)]
+            if len({(len(n.signals), len(n.parameters)) for n in networks}) == 1:
                 continue  # no film of this building does
-            if (seen := ladder.look(name, begins)).left.mae < least:
+            if (seen := ladder.look(name, begins)).left.mae < (1.0 - better) * least:
                 looked.append(seen)
                 least, begun[name], base, fitted = seen.left.mae, (follows, fitted), follows, begins
     differing = set(chain(*by_zone(given.case.building)))
@@ -273,8 +276,7 @@ def _best(looked: Sequence[_Looked], advance: float, lumped_advance: float = ADV
     best = 0
     for number, other in enumerate(looked):
         over_the_first = lumped_advance if other.name in _LUMPED else advance
-        # films that follow something have no more parameters
-        least = 0.0 if other.name in _FILMS else ADVANCE if best else over_the_first
+        least = _UNDRAWN[other.name][2] if other.name in _UNDRAWN else ADVANCE if best else over_the_first
         if other.left.mae < (1.0 - least) * looked[best].left.mae:
             best = number
     return best

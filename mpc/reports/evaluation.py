@@ -130,6 +130,7 @@ _STRUCTURES = {
     "radiator": "as drawn, with heat that radiates in part",
     "floor": "as drawn, with heat that floors give",
     "natural convection": "as drawn, with inside films that follow the heat of their zone",
+    "light contents": "as drawn, with light things whose heat capacity adds to the air's",
     "wind": "as drawn, with outside films that follow the wind",
     "zoned": "as drawn, with values of each zone's own",
     "people": "as drawn with people who have hours of their own in each zone",

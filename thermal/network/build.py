@@ -162,6 +162,7 @@ def build_network(
 def _lumped(building: Building, dx: float | None, structure: Structure) -> Blueprint:
     """Lump a building into two nodes a zone."""
     drawn = replace(structure, lumped=False, sun=False, recurring=False, wind_films=False, natural_films=False)
+    drawn = replace(drawn, light_contents=False)
     detailed = build_network(replace(building, commanded=()), dx, structure=drawn)
     graph, air = lump(detailed, building.geometry_quality, structure)
     add_emitters(graph, emitters_of(building, structure.emitter))

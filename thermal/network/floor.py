@@ -278,7 +278,7 @@ class Floor:
         air, count = self.node[mine], self.cells[mine]
         zone = Zone(graph, name, air, count / count.sum())
         heat = graph.anatomy.air_heat_capacity
-        graph.capacity("air", heat, air, area * self.plan.height * zone.share)
+        graph.air_capacity(name, air, area * self.plan.height * zone.share)
         if air.size > 1:
             self._air(zone, area, heat, reach, mean_shuffle)
         zone.slabs(area)

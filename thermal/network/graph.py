@@ -285,6 +285,22 @@ class GraphBuilder:
         node, weight = np.broadcast_arrays(np.atleast_1d(node), np.asarray(weight, float))
         self._masses.setdefault(key, (ca.SX(value), []))[1].append((node, weight))
 
+    def air_capacity(self, zone: str, node: Any, volume: Any) -> None:
+        """Give the air of a zone its heat capacity, and that of what follows it where the structure has it.
+
+        Parameters
+        ----------
+        zone : str
+            Name of the zone.
+        node : int or ndarray of int, shape (n,)
+            Its air.
+        volume : float or ndarray, shape (n,)
+            How much each has [m3].
+        """
+        name = "air_capacity_multiplier"
+        more = self.parameter(name, zone) if self.structure.light_contents else 1.0
+        self.capacity(self.key("air", zone, name), self.anatomy.air_heat_capacity * more, node, volume)
+
     def finish(
         self,
         observation: sp.csr_matrix,

@@ -107,6 +107,9 @@ class Structure:
     natural_films : bool
         Inside films that follow the heat of their zone, as natural convection does, of a model with a radiant node that
         is not lumped.
+    light_contents : bool
+        A multiplier of the air's heat capacity, for what follows the air within minutes, of a model that is not lumped,
+        which has one a zone.
     emitter : {"air", "radiator", "floor"}
         What plain heaters of which a case does not say it give their heat by: the air alone, surfaces too, or floors
         too, each zone's by a share that is fitted.
@@ -132,6 +135,7 @@ class Structure:
     recurring: bool = False
     wind_films: bool = False
     natural_films: bool = False
+    light_contents: bool = False
     emitter: Unknown = "air"
 
     @property
@@ -140,7 +144,8 @@ class Structure:
         return self.wind_films or self.natural_films
 
     def __post_init__(self) -> None:
-        for name in ("furniture", "radiant", "lumped", "sun", "recurring", "wind_films", "natural_films"):
+        films = "wind_films", "natural_films"
+        for name in ("furniture", "radiant", "lumped", "sun", "recurring", *films, "light_contents"):
             if not isinstance(getattr(self, name), bool):
                 raise ModelError(f"structure.{name}: expected true or false, got {getattr(self, name)!r}")
         if self.emitter not in get_args(Unknown):

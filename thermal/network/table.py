@@ -133,7 +133,7 @@ def add_table(graph: GraphBuilder, table: ZoneTable) -> IntArray:
     zones: dict[str, Zone] = {}
     for entry in table.zones:
         air = graph.volumes("air", graph.zones.index(entry.name))
-        graph.capacity("air", graph.anatomy.air_heat_capacity, air, entry.volume)
+        graph.air_capacity(entry.name, air, entry.volume)
         zones[entry.name] = Zone(graph, entry.name, air, np.ones(1))
         zones[entry.name].furniture(entry.floor_area)
     for surface in table.surfaces:

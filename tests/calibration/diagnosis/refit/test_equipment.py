@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from calibration.diagnosis.decide.verdict import group_of
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.diagnosis.refit.refit import held_out
+from calibration.diagnosis.refit.repeat import agreement
 from calibration.diagnosis.refit.search import Round, search
 from calibration.diagnosis.screen.screen import Screening
 from calibration.evaluation.settings import ModelSettings
@@ -65,6 +66,10 @@ def test_heat_that_is_always_on_is_told_with_the_valve_that_would_do_the_same() 
     assert gains.zones == (zone,)
     area = first.before.built.network.anatomy.rooms[zone].floor_area
     assert gains.fit.values[f"equipment_gain@{zone}"] * area == pytest.approx(400.0, rel=0.2)
+    # no data tell anything of what is never seen on, and its two halves do not disagree of it
+    own = {name for name in gains.fit.values if name.endswith(f"@{zone}")}
+    assert own - gains.fit.told == {f"switched_heat@{zone}"}
+    assert agreement(gains.fit)["internal_gains"].agrees
 
 
 def test_heat_that_is_switched_is_seen_and_sized() -> None:
