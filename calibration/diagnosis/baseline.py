@@ -1,6 +1,6 @@
 """The baseline of a diagnosis: as drawn, with films, contents and emitters by the evidence, which no case says."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from calibration.diagnosis.decide.levels import APART
@@ -9,19 +9,23 @@ from calibration.fit.fitted_case import is_large
 from calibration.fit.ladder import fit_emitter
 from calibration.fit.left_out import values_of
 from calibration.progress import Progress
+from thermal.network.structure import Structure
 
-
-#: Parts of a structure that drawings do not tell and no reading does, in the order in which they are tried.
-_NEARER = ("natural_films", "light_contents")
+#: Parts of a structure that drawings do not tell, in the order in which they are tried.
+_UNDRAWN: tuple[Callable[[Structure], Structure], ...] = (
+    lambda structure: replace(structure, natural_films=True),
+    lambda structure: replace(structure, light_contents=True),
+)
 
 
 def fit_baseline(
     models: ModelComparison, effects: Mapping[str, Sequence[str]], progress: Progress | None = None
 ) -> tuple[ModelComparison, Fit]:
-    """Fit the baseline, with films that follow heat and light contents if these are likelier, emitters by left-out days.
+    """Fit the baseline, with films that follow heat and light contents if likelier, and emitters by left-out days.
 
-    Natural convection needs no parameter, and things that follow the air within minutes one: evidence decides, once it is
-    strong. In buildings of more than 40 zones both are left out. Heated floors or radiators are taken if left-out tuning days say so.
+    Natural convection needs no parameter, and things that follow the air within minutes one: evidence decides, once it
+    is strong. In buildings of more than 40 zones both are left out. Heated floors or radiators are taken if left-out
+    tuning days say so.
 
     Parameters
     ----------
@@ -40,13 +44,15 @@ def fit_baseline(
     known = {name: tuple(zones) for name, zones in effects.items()}
     found = models.fit(known, [{}])
     if not is_large(models.case.building.zone_names) and not models.settings.structure.lumped:
-        for name in _NEARER:
-            structure = replace(models.settings.structure, **{name: True})
+        for undrawn in _UNDRAWN:
+            structure = undrawn(models.settings.structure)
             nearer = replace(models, settings=replace(models.settings, structure=structure))
             nearer.drivers = models.drivers
-            if name == "natural_films" and all(r.convection is None for r in nearer.anatomy.rooms.values()):
-                continue
-            if (other := nearer.fit(known, [found.values])).evidence > found.evidence + APART:
+            built = nearer.build(known)
+            sizes = {(len(n.signals), len(n.parameters)) for n in (built.network, found.built.network)}
+            if len(sizes) == 1:
+                continue  # no film of this building does
+            if (other := nearer.fit(known, [found.values], built)).evidence > found.evidence + APART:
                 models, found = nearer, other
     heated = fit_emitter(found.known, models, known, progress)
     if heated is None:

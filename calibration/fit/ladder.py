@@ -56,8 +56,8 @@ _EMITTERS: tuple[Unknown, Unknown] = ("floor", "radiator")
 #: Tuning days from which a gain that recurs from day to day is looked for [days]: it has to recur.
 _WEEK = 7.0
 
-#: What no drawing tells, by the name of the structure: what must be known, what the structure then has, and the share by
-#: which it must do better [-]: films that follow something have no more parameters, contents have one.
+#: What no drawing tells, by the name of the structure: what must be known, what the structure then has, and the share
+#: by which it must do better [-]: films that follow something have no more parameters, contents have one.
 _UNDRAWN: dict[str, tuple[str, Callable[[Structure], Structure], float]] = {
     "natural convection": ("heat", lambda structure: replace(structure, natural_films=True), 0.0),
     "light contents": ("heat", lambda structure: replace(structure, light_contents=True), _MOVED),
@@ -191,11 +191,11 @@ def climb_from(
     """Fit further structures beside a fitted model; the simplest is kept that predicts left-out days about best.
 
     With heat that radiates, or that floors give, where the case does not say what heaters give it by; with inside films
-    that follow the heat, contents that follow the air, outside films that follow the wind, and with slabs and furniture by zone (outer walls and windows too, where the drawing is
-    no survey), unless a lumped model halves the drawing's error;
-    lumped, where the sun is a part of it, by an estimate if irradiance is not measured; lumped, with a gain that recurs
-    from day to day, which is linear, so that a few Newton steps from the lumped estimate tell whether it is worth a
-    fit; as drawn with the heat of people who have hours of their own in each zone, looked at in the same way;
+    that follow the heat, contents that follow the air, outside films that follow the wind, and with slabs and furniture
+    by zone (outer walls and windows too, where the drawing is no survey), unless a lumped model halves the drawing's
+    error; lumped, where the sun is a part of it, by an estimate if irradiance is not measured; lumped, with a gain that
+    recurs from day to day, which is linear, so that a few Newton steps from the lumped estimate tell whether it is
+    worth a fit; as drawn with the heat of people who have hours of their own in each zone, looked at in the same way;
     lumped with floors that are heated, where the drawing has them or lumped alone is better than any drawing; and
     where one of these is kept, with heat and weather moved in time.
 
