@@ -117,6 +117,9 @@ class Diagnosis(Result):
         The baseline with heat of unknown cause, where no effect explains what is missing and such heat is certified.
     faults : tuple of Fault
         Of the telemetry, which were mended before anything else: all the rest is about the mended case.
+    outdone : float or None
+        Held-out mean absolute error of a regression on the same telemetry, where that says that something is missing
+        beside all that was found [K].
     """
 
     case: str
@@ -145,6 +148,7 @@ class Diagnosis(Result):
     left_over: Regular | None = None
     correction: Correction | None = None
     faults: tuple[Fault, ...] = ()
+    outdone: float | None = None
 
     @property
     def final(self) -> Fit:
@@ -197,6 +201,7 @@ class Diagnosis(Result):
                 "floor": self.floor,
                 "p_value": self.p_value,
                 "smallest_detectable_watts": self.detectable,
+                "outdone": self.outdone,
                 **({} if simple is None else simple.beside(self.predicts)),
             },
             "where": {
@@ -355,7 +360,7 @@ def diagnose(
         settings=replace(models.settings, normalisation=models.drivers.normalisation), horizon=horizon,
         last_third=found.last_third, rungs=rungs, better=better, prediction=prediction,
         estimated=found.case.estimated, disturbance=disturbance, band_factors=factors,
-        left_over=found.left_over, correction=correction, faults=found.faults,
+        left_over=found.left_over, correction=correction, faults=found.faults, outdone=found.outdone,
     )  # fmt: skip
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 from calibration.diagnosis.baseline import fit_baseline
+from calibration.diagnosis.decide.outdone import is_outdone, regression_held_out
 from calibration.diagnosis.decide.verdict import Verdict, doubted, gains_of, judge, summarised
 from calibration.diagnosis.faults import LEAST, Fault, mend, with_faults
 from calibration.diagnosis.free import Free, drawing_fails, held_against, must_be_better_by, search_free, with_recurring
@@ -82,6 +83,9 @@ class Sought:
         Of the telemetry, which were mended before anything else.
     seconds : float
         CPU time [s].
+    outdone : float or None
+        Held-out mean absolute error of a regression that knows nothing of buildings, where that says that something is
+        missing beside all that was found [K].
     """
 
     models: ModelComparison
@@ -95,6 +99,7 @@ class Sought:
     last_third: float | None
     faults: tuple[Fault, ...] = ()
     seconds: float = field(default=0.0, compare=False)
+    outdone: float | None = None
 
     @property
     def case(self) -> Case:
@@ -118,6 +123,7 @@ class Sought:
             "gap": {"mae": self.gap, "floor": self.floor.mae},
             **answer_entries(self.verdict, self.steps, self.rounds, self.faults, self.floor.mae),
             "intervals": {"mae_of_last_third": self.last_third},
+            "outdone": self.outdone,
             "seconds": self.seconds,
         }
 
@@ -213,14 +219,20 @@ def _seek(drawn: ModelComparison, known: Sequence[str], ruled_out: Sequence[str]
         "values by zone", lambda: challenge(models, rounds, testable, whole.part(0.3, "values by zone"))
     )
     about = _About(models, rounds, untestable)
-    if judge(rounds, untestable).name != "no_gap":
+    nothing = judge(rounds, untestable).name == "no_gap"
+    regression = regression_held_out(models, rounds[-1].after) if nothing else None
+    if not nothing or is_outdone(rounds[-1].after_held_out, regression):
         about = stage("structures", lambda: _other_structures(about, known, ruled_out, whole))
     models, rounds, untestable, structures, free, left_over = about
     steps, floor = how_far(models, rounds)
     verdict = doubted(judge(rounds, untestable, left_over), {s.effects[-1] for s in steps if s.void})
     if free is not None and structures is not None:
         verdict = with_recurring(verdict, free, structures.rungs)
-    return Sought(models, rounds, verdict, steps, floor, structures, free, left_over, last_third)
+    regression = regression or regression_held_out(models, rounds[-1].after)
+    outdone = regression.mae if regression and is_outdone(rounds[-1].after_held_out, regression) else None
+    if outdone is not None and verdict.name == "no_gap":
+        verdict = replace(verdict, name="unexplained")
+    return Sought(models, rounds, verdict, steps, floor, structures, free, left_over, last_third, outdone=outdone)
 
 
 def _begin(
@@ -252,7 +264,8 @@ class _About(NamedTuple):
 def _other_structures(about: _About, known: Sequence[str], ruled_out: Sequence[str], whole: Forward) -> _About:
     """Hold other structures against a drawing that lacks something, and seek effects about a free one."""
     models, rounds, case = about.models, about.rounds, about.models.case
-    unexplained, alone = judge(rounds, about.untestable).name == "unexplained", summarised(rounds).by_size_alone()
+    told, alone = judge(rounds, about.untestable).name, summarised(rounds).by_size_alone()
+    unexplained = told in ("unexplained", "no_gap")  # or a regression says that there is a gap
     # a drawing that is known to lack what nothing explains has no advance
     advance = 0.0 if unexplained else ADVANCE
     for fit in held_against(rounds, case.building.geometry_quality):

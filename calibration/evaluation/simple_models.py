@@ -107,6 +107,40 @@ def with_yardsticks(
     return replace(evaluation, yardsticks=Yardsticks(**found, reasons=reasons, seconds=seconds))  # type: ignore[arg-type]
 
 
+def regression_errors(
+    evaluation: Evaluation,
+    case: Case,
+    inputs: Inputs,
+    anatomy: Anatomy,
+    tuned: Sequence[Interval],
+    spin_up_seconds: float = SPIN_UP,
+) -> list[FloatArray]:
+    """Errors of a ridge regression on the runs of an evaluation, by prediction, shape (n_run, n_zone) each [K].
+
+    Parameters
+    ----------
+    evaluation, case, inputs, anatomy, tuned
+        As in `with_yardsticks`.
+    spin_up_seconds : float
+        Telemetry before an interval that the spin-up may use [s].
+
+    Raises
+    ------
+    NotEnoughDataError
+        When no zone is measured on the tuning days, or these are too few.
+    """
+    seen = _seen(inputs, tuned)
+    if not seen.any():
+        raise NotEnoughDataError("no zone is measured on the tuning days")
+    runs = [select_runs(inputs, p.interval, evaluation.steps, spin_up=spin_up_seconds) for p in evaluation.predictions]
+    simple, errors = _SimpleModels(case, inputs, anatomy, seen, evaluation.steps), []
+    for r, p, own in zip(runs, evaluation.predictions, simple.regression(tuned, runs, spin_up_seconds), strict=True):
+        whole = inputs.held[r.starts].copy()
+        whole[:, seen] = own
+        errors.append(whole - p.measured[:, -1])
+    return errors
+
+
 def rest_of(stamps: pd.DatetimeIndex, intervals: Sequence[Interval]) -> list[Interval]:
     """Parts of the telemetry outside of some intervals, of two stamps or more each.
 

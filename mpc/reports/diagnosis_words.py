@@ -43,6 +43,11 @@ def diagnosis_verdict(result: Diagnosis) -> str:
         From `diagnose`.
     """
     text = faults_sentence(result) + free_sentence(result) + _verdict(result)
+    if result.outdone is not None:
+        text += (
+            " A regression on the same telemetry, which knows nothing of buildings, misses the same days by "
+            f"{kelvin(result.outdone)} K only: something is missing beyond what was found."
+        )
     if known := known_effects(result):
         text += f" {listed([called(e) for e in known]).capitalize()}, known to be there, is part of the baseline."
     if "solar_gain" in result.final.effects and any(IRRADIANCE in c.reason for c in result.verdict.candidates):
@@ -74,6 +79,8 @@ def _verdict(result: Diagnosis) -> str:
     """Say which effect is missing, and how far the error falls with it."""
     if result.verdict.name == "unexplained":
         return _unexplained(result) + correction_sentence(result)
+    if result.outdone is not None and not accepted(result):
+        return _unexplained(result)
     if result.verdict.name == "no_gap" or not accepted(result):  # a fault of the telemetry may be named
         return _no_gap(result)
     found = accepted(result)

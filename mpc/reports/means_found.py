@@ -50,7 +50,8 @@ def diagnosis_means(result: Diagnosis) -> Means:
     if name == "unexplained":
         best = result.verdict.candidates[0]
         answer = "Something is missing in the model, and none of the known causes explains it."
-        trust = f"The gap is real ({kelvin(result.gap)} degrees C where {kelvin(result.floor)} should be possible); "
+        least = result.floor if result.outdone is None else result.outdone
+        trust = f"The gap is real ({kelvin(result.gap)} degrees C where {kelvin(least)} should be possible); "
         trust += f"its cause is not known. The best guess, {called(best.effect)}, has {sure(best.probability)}."
         advice = CATALOGUE[best.effect].separated_by if best.effect in CATALOGUE else ""
         then = "Measure before you change anything"

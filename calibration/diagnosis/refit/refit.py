@@ -15,6 +15,7 @@ from calibration.diagnosis.screen.gains import MATTERS, Gain, choice_of
 from calibration.diagnosis.screen.screen import Screening
 from calibration.diagnosis.screen.seen import WINDOWS, seen_beyond
 from calibration.errors import CalibrationError
+from calibration.evaluation.n_step import Predictions
 from calibration.fit.problem import Problem
 from thermal._types import FloatArray, IntArray
 from thermal.effects.catalogue import CATALOGUE
@@ -80,11 +81,27 @@ def held_out(models: ModelComparison, fit: Fit, horizon: str | None = None) -> H
     horizon : str, optional
         That of the comparison by default.
     """
+    predictions = fit.evaluate(models.judged, horizon or models.horizon).predictions
+    return by_day(predictions, [p.error for p in predictions], fit.built.inputs.step)
+
+
+def by_day(predictions: Sequence[Predictions], errors: Sequence[FloatArray], step: float) -> HeldOut:
+    """Errors of some predictions, by the days of their ends.
+
+    Parameters
+    ----------
+    predictions : sequence of Predictions
+        Whose runs they are.
+    errors : sequence of ndarray, shape (n_run, n_zone)
+        At the end of the horizon, by prediction [K].
+    step : float
+        Of the telemetry [s].
+    """
     size, day = [], []
-    for p in fit.evaluate(models.judged, horizon or models.horizon).predictions:
-        step = pd.Timedelta(seconds=fit.built.inputs.step)
-        size.append(np.nanmean(np.abs(p.error), axis=1))
-        day.append((p.start + (int(p.steps[-1]) - 1) * step).normalize().asi8)  # a stamp ends its step
+    for p, error in zip(predictions, errors, strict=True):
+        size.append(np.nanmean(np.abs(error), axis=1))
+        # a stamp ends its step
+        day.append((p.start + (int(p.steps[-1]) - 1) * pd.Timedelta(seconds=step)).normalize().asi8)
     sizes, days = np.concatenate(size), np.concatenate(day)
     known = np.isfinite(sizes)
     there, index = np.unique(days[known], return_inverse=True)
