@@ -217,7 +217,7 @@ def read(out: Path) -> dict[str, tuple[dict[str, Any], Trial]]:
         answer["gap"] = {**answer["gap"], "mae": _error_with(answer, own)}
         if set() < _effects_of(answer) <= own and answer["verdict"] != "unexplained":
             # nothing but what the building is known to have, or more that has no name
-            answer["verdict"] = "no_gap" if answer.get("outdone") is None else "unexplained"
+            answer["verdict"] = "no_gap" if answer["gap"].get("outdone") is None else "unexplained"
         found[name] = label, Trial(
             name, "null" if null else "single", () if null else (frozenset(right),), () if null else (label["kind"],),
             1.0, frozenset(label["zones"]), unexplained, () if null else (twin,), answer, True, label["numbers"],

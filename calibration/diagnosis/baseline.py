@@ -51,7 +51,7 @@ def fit_baseline(
             built = nearer.build(known)
             sizes = {(len(n.signals), len(n.parameters)) for n in (built.network, found.built.network)}
             if len(sizes) == 1:
-                continue  # no film of this building does
+                continue  # nothing of this building does
             if (other := nearer.fit(known, [found.values], built)).evidence > found.evidence + APART:
                 models, found = nearer, other
     heated = fit_emitter(found.known, models, known, progress)

@@ -51,7 +51,7 @@ def with_people(models: ModelComparison, rounds: Sequence[Round], kept: FittedCa
     begun = rounds[number]
     level = accepted_from(begun.own)
     # what tangents say of it by a schedule, which every case can tell, is what it looks like
-    scheduled = next(g for g in begun.gains if g.effect == GAINS)
+    scheduled = next(way for way in begun.screening.ways(GAINS) if not way.zones)
     work = Work(models, begun.before, begun.held_out, begun.screening, level)
     fitted = models.fit(effects, [values_of(kept.best)])
     found = work.weighed([replace(scheduled, zones=tuple(effects[GAINS]))], fitted)

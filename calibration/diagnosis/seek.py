@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 from calibration.diagnosis.baseline import fit_baseline
-from calibration.diagnosis.decide.outdone import is_outdone, regression_held_out
+from calibration.diagnosis.decide.outdone import held_out_of, is_outdone, regression_held_out
 from calibration.diagnosis.decide.verdict import Verdict, doubted, gains_of, judge, summarised
 from calibration.diagnosis.faults import LEAST, Fault, mend, with_faults
 from calibration.diagnosis.free import Free, drawing_fails, held_against, must_be_better_by, search_free, with_recurring
@@ -120,10 +120,9 @@ class Sought:
         """Entries of ``diagnosis.json`` that tell the answer."""
         return {
             "verdict": self.verdict.name,
-            "gap": {"mae": self.gap, "floor": self.floor.mae},
+            "gap": {"mae": self.gap, "floor": self.floor.mae, "outdone": self.outdone},
             **answer_entries(self.verdict, self.steps, self.rounds, self.faults, self.floor.mae),
             "intervals": {"mae_of_last_third": self.last_third},
-            "outdone": self.outdone,
             "seconds": self.seconds,
         }
 
@@ -203,6 +202,8 @@ def seek(
         if other.left < (1.0 - LEAST) * sought.left:
             sought = replace(other, last_third=sought.last_third)
     verdict, seconds = with_faults(sought.verdict, sought.faults), time.process_time() - began
+    if sought.outdone is not None and verdict.name == "no_gap":
+        verdict = replace(verdict, name="unexplained")
     return replace(sought, verdict=verdict, seconds=seconds)
 
 
@@ -229,9 +230,9 @@ def _seek(drawn: ModelComparison, known: Sequence[str], ruled_out: Sequence[str]
     if free is not None and structures is not None:
         verdict = with_recurring(verdict, free, structures.rungs)
     regression = regression or regression_held_out(models, rounds[-1].after)
-    outdone = regression.mae if regression and is_outdone(rounds[-1].after_held_out, regression) else None
-    if outdone is not None and verdict.name == "no_gap":
-        verdict = replace(verdict, name="unexplained")
+    kept = None if structures is None or free is not None else structures.kept
+    errors = rounds[-1].after_held_out if kept is None else held_out_of(models, kept.best)
+    outdone = regression.mae if regression and is_outdone(errors, regression) else None
     return Sought(models, rounds, verdict, steps, floor, structures, free, left_over, last_third, outdone=outdone)
 
 

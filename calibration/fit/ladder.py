@@ -244,7 +244,7 @@ def climb_from(
             begins = _begun(given, follows, fitted)
             networks = [each.problem.grid.network for each in (begins, fitted)]
             if len({(len(n.signals), len(n.parameters)) for n in networks}) == 1:
-                continue  # no film of this building does
+                continue  # nothing of this building does
             if (seen := ladder.look(name, begins)).left.mae < (1.0 - better) * least:
                 looked.append(seen)
                 least, begun[name], base, fitted = seen.left.mae, (follows, fitted), follows, begins

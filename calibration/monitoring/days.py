@@ -389,7 +389,7 @@ class _Replay:
 
 def _column(p: Parameter, value: float, present: bool) -> Column:
     """Tell what a parameter is to a monitoring."""
-    zonal = effect_of(p.effect).zonal if p.effect is not None else False
+    zonal = effect_of(p.effect).takes_zones if p.effect is not None else False
     zones = zones_of([p.member]) if zonal and p.member is not None else ()
     changes = is_strength(p.name, p.effect) and p.effect in (*MAY_CHANGE, *NO_CAUSE)
     limits = _LIMITS.get(p.base, (0.0 if p.lower == 0.0 else -np.inf, np.inf))

@@ -23,6 +23,7 @@ from mpc.studies.optimal_control import Site as ControlledSite
 from mpc.studies.optimal_control import make_controller
 from thermal.case.building import Building
 from thermal.case.load import load_building
+from thermal.effects.gains import has_people
 from thermal.system.sizing import size_system
 from thermal.system.system import HvacSystem
 
@@ -129,7 +130,7 @@ def building_controller(site: Site, model: BuildingModel, actuators: tuple[Actua
     missing = sorted(needed - set(site.file.points))
     expected = "all that the state of a building is estimated from"
     LiveError.unless(not missing, f"{site.path.name}: points", expected, f"none of {', '.join(missing[:5])}")
-    return BuildingController(controller, "internal_gains" in model_settings(parameters).effects)
+    return BuildingController(controller, has_people(building, model_settings(parameters).effects))
 
 
 def believed(site: Site, model: BuildingModel) -> tuple[Building, HvacSystem, Path | None]:

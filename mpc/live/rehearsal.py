@@ -43,6 +43,7 @@ from mpc.studies.optimal_control import MODEL_STEP
 from thermal._types import FloatArray
 from thermal.case.building import Building
 from thermal.case.points import OUTDOOR_TEMPERATURE
+from thermal.effects.gains import has_people
 
 #: Days that come before the first, all under the building's own control, as walls forget how they began and a Monday
 #: makes up for a weekend: those recorded before it, or of a week [d] the week itself, and how often the first of them.
@@ -182,7 +183,7 @@ def rehearse(
     lead = taken.size - steps
     building, system, parameters = believed(site, entry)
     step = MODEL_STEP if site.step % MODEL_STEP == 0.0 else site.step
-    gains = "internal_gains" not in model_settings(parameters).effects  # which the model has itself otherwise
+    gains = not has_people(building, model_settings(parameters).effects)  # which the model has itself otherwise
     now, table = _as_recorded(site, building, recorded, first, taken, gains)
     observed = building_controller(site, entry, site_actuators(site))
     points = [name for name in observed.columns if name in site.file.points]

@@ -79,8 +79,6 @@ def _verdict(result: Diagnosis) -> str:
     """Say which effect is missing, and how far the error falls with it."""
     if result.verdict.name == "unexplained":
         return _unexplained(result) + correction_sentence(result)
-    if result.outdone is not None and not accepted(result):
-        return _unexplained(result)
     if result.verdict.name == "no_gap" or not accepted(result):  # a fault of the telemetry may be named
         return _no_gap(result)
     found = accepted(result)

@@ -24,6 +24,7 @@ from mpc.scenario.weather import Weather
 from mpc.studies.optimal_control import MODEL_STEP
 from thermal.case.building import Building
 from thermal.effects.catalogue import chosen
+from thermal.effects.gains import has_people
 from thermal.model.reduce import ReducedModel
 from thermal.system.sizing import size_system
 from thermal.system.system import HvacSystem
@@ -221,7 +222,7 @@ def make_study(
     if given.system is None:
         notes += ("sizes of the plant follow from the loads of the building",)
     gains = None
-    if "internal_gains" in built.effects:
+    if has_people(building, built.effects):
         gains = InternalGains(sensible=0.0, equipment=0.0, lights=0.0)
         notes += ("heat of people and equipment is that of the calibrated effect, none is added",)
     scenario = given.scenario(ready, longer, _prolonged(weather, grid, longer), gains)

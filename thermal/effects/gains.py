@@ -1,6 +1,6 @@
 """Heat of sun and people: sun through glass and on opaque walls, blinds, gains of people, latent load."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from operator import attrgetter
 
@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 
 from thermal._types import FloatArray
+from thermal.case.building import Building
 from thermal.effects.effect import EffectBuilder, described, lacking
 from thermal.effects.weights import hat
 from thermal.inputs.provider import InputProvider
@@ -158,6 +159,22 @@ SOLAR_GAIN = described("solar_gain", _build_gain, _no_panes)
 BLINDS = described("blinds", _build_blinds, _no_panes)
 SOLAR_OPAQUE = described("solar_opaque", _build_opaque, _no_walls)
 INTERNAL_GAINS = described("internal_gains", _build_people)
+
+
+def has_people(building: Building, effects: Mapping[str, Sequence[str]]) -> bool:
+    """Whether a model has the heat of people, and not only equipment of some zones.
+
+    Parameters
+    ----------
+    building : Building
+        Of the model.
+    effects : mapping of str to sequence of str
+        Of the model, with their zones.
+    """
+    zones = effects.get(INTERNAL_GAINS.id)
+    return zones is not None and len(zones) in (0, len(building.zone_names))
+
+
 #: What is switched in some rooms alone, for a screening.
 SWITCHED = replace(INTERNAL_GAINS, build=_build_switched)
 LATENT_LOAD = described("latent_load", _build_latent)

@@ -62,8 +62,10 @@ def agreement(fit: Fit) -> dict[str, Repeats]:
     halves = _halves(problem)
     if halves is None or not fit.effects:
         return {}
-    (one, spread), (other, spread_of_other) = (_estimate(half, fit.model, fit.point) for half in halves)
-    apart, covariance = one - other, spread + spread_of_other
+    (one, spread, known), (other, spread_of_other, of_other) = (_estimate(h, fit.model, fit.point) for h in halves)
+    # what the one half tells more of than the other, that stays at its prior
+    more = known - of_other
+    apart, covariance = one - other, spread + spread_of_other + more @ problem.prior_covariance() @ more.T
     found, thetas = {}, [problem.theta(point) for point in (one, other)]
     for effect in fit.effects:
         strengths = (i for i, p in enumerate(problem.parameters) if p.effect == effect and is_strength(p.name, effect))
@@ -86,10 +88,11 @@ def _halves(problem: Problem) -> tuple[Problem, Problem] | None:
     return made[0], made[1]
 
 
-def _estimate(half: Problem, model: ReducedModel, point: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Estimate of a half, and the covariance that its data give it, priors holding."""
+def _estimate(half: Problem, model: ReducedModel, point: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Estimate of a half, the covariance that its data give it, priors holding, and how far they move it from these."""
     point = newton(half, model, point)
     data = half.weighted(model, point)[1][: -point.size]
     prior = np.linalg.inv(half.prior_covariance())
     held = np.linalg.inv(data.T @ data + prior)
-    return point, np.asarray(held @ (data.T @ data) @ held)
+    known = np.asarray(held @ (data.T @ data))
+    return point, known @ held, known

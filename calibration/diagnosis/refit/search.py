@@ -268,6 +268,7 @@ def _refits(work: Work, gains: Sequence[Gain], ahead: Refit | None) -> list[Refi
         for g in gains:
             there_too = CATALOGUE[g.effect].alike if best.screened.zones == ALIKE else CATALOGUE[g.effect].takes_zones
             confounded = g.effect in CATALOGUE[best.screened.effect].confounders
+            there_too &= not (CATALOGUE[g.effect].courses and work.made.is_everywhere(best.screened.zones))
             # tangents at no strength may miss where it is, or what it does
             if confounded and there_too and g.effect not in fitted:
                 chosen = best.screened

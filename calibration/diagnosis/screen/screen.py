@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison, is_strength
+from calibration.diagnosis.screen.alike import alike
 from calibration.diagnosis.screen.equipment import EQUIPPED, always_on, at_times
 from calibration.diagnosis.screen.gains import Gain, choice_of
 from calibration.diagnosis.screen.generic import GENERIC, TIGHTNESS, ZONE_HEAT
@@ -73,7 +74,7 @@ class Screening:
             low, high = (problem.residuals_only(model, end + little) for end in (theta, other))
             jacobian = np.column_stack([jacobian, jacobian[:, i] + (high - low) / little[i]])
         self._twins = {len(own) + k: i for k, i in enumerate(twice)}
-        tied = {} if here else _tied(own, [e for e in lacking if CATALOGUE[e].alike])
+        tied = {} if here else alike(own, [e for e in lacking if CATALOGUE[e].alike])
         alone = always_on(own) if EQUIPPED in lacking else {}
         self._tied = range(len(own) + len(twice), len(own) + len(twice) + len(tied))
         jacobian = np.column_stack(
@@ -172,10 +173,20 @@ class Screening:
             return [self._gain(effect, self.strengths_of(effect), ())]
         members, everywhere = self.members_of(effect)
         found = [self._grow(effect, members)] if members else []
-        if CATALOGUE[effect].courses:  # in all zones it is another
-            found = [way for way in found if len(way.zones) < self._zones]
         found += [self._gain(effect, index, zones) for zones, index in everywhere.items()]
+        if CATALOGUE[effect].courses:  # in all zones it is another
+            found = [way for way in found if not self.is_everywhere(way.zones)] or found
         return sorted(found, key=lambda g: -g.gain)
+
+    def is_everywhere(self, zones: Sequence[str]) -> bool:
+        """Whether zones are all that the building has, by name; none stand for the whole building.
+
+        Parameters
+        ----------
+        zones : sequence of str
+            Names.
+        """
+        return len(zones) == self._zones
 
     def members_of(self, effect: str) -> tuple[dict[str, IntArray], dict[tuple[str, ...], IntArray]]:
         """Positions of an effect's strengths by zone or pair of zones, those that show nothing left out.
@@ -362,15 +373,6 @@ class Screening:
         kept = float(along @ self.gram @ along) / whole if whole > 0.0 else 0.0
         strengths, errors = self._named(effect, index, x, np.asarray(np.linalg.inv(sharper)))
         return Gain(effect, zones, gain - choice, share, strengths, errors, kept, direction, index, places, choice)
-
-
-def _tied(parameters: Sequence[Parameter], effects: Sequence[str]) -> dict[Parameter, list[int]]:
-    """Strengths that zones share where they are alike, with the positions of those that are made one."""
-    found: dict[Parameter, list[int]] = {}
-    for i, p in enumerate(parameters):
-        if p.effect in effects and p.member is not None and is_strength(p.name, p.effect):
-            found.setdefault(replace(p, name=p.base, scope="global", member=None), []).append(i)
-    return {p: mine for p, mine in found.items() if len(mine) > 1}
 
 
 def _worst_zones(fit: Fit) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -76,7 +77,9 @@ def seen_at_first(case: Case, drivers: InputProvider, settings: ModelSettings) -
     """
     if len(drivers.zones) > _MOST_ZONES:
         return Seen(np.zeros_like(drivers.openings), np.zeros_like(drivers.openings))
-    network = settings.network(case.building)
+    # as long as nothing is fitted the air is what is drawn
+    drawn = replace(settings, structure=replace(settings.structure, light_contents=False))
+    network = drawn.network(case.building)
     theta = np.array([p.start for p in network.parameters])
     return seen_beyond(SymbolicModel(network), theta, drivers, replay_inputs(case, network, drivers))
 
