@@ -8,7 +8,7 @@ import pytest
 from thermal import Case, SymbolicModel, ThermalNetwork, build_network
 from thermal.case.building import Building
 from thermal.effects.catalogue import chosen
-from thermal.effects.gains import daily_course
+from thermal.effects.gains import daily_course, has_people
 from thermal.network.structure import Structure
 
 CaseOf = Callable[[str], Case]
@@ -75,6 +75,12 @@ def test_some_rooms_that_are_named_have_equipment(building: Building) -> None:
     assert heat == pytest.approx({"A": 4.0 * FLOOR["A"], "B": 0.0}, rel=1e-9)
     heat = heat_by_zone(network, "heat seen on in A", **{"switched_heat@A": 900.0})
     assert heat == pytest.approx({"A": 900.0, "B": 0.0}, rel=1e-9)
+
+
+def test_equipment_of_some_rooms_is_nobodys_heat(building: Building) -> None:
+    for zones, people in (((), True), (("A", "B"), True), (("A",), False)):
+        assert has_people(building, {"internal_gains": zones}) is people
+    assert not has_people(building, {"solar_gain": ()})
 
 
 def test_moisture_is_seen_by_what_cools_the_air(unserved: Building) -> None:

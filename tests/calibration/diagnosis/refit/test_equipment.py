@@ -87,6 +87,21 @@ def test_heat_that_is_switched_is_seen_and_sized() -> None:
     assert accepted.held_out.mae < 0.6 * first.held_out.mae
 
 
+def test_heat_that_is_on_in_one_half_only_is_no_disagreement() -> None:
+    rng, steps = np.random.default_rng(6), len(twin().telemetry.frame)
+    on = np.zeros(steps)
+    for begin in rng.integers(300, steps // 4, 10):
+        on[begin : begin + int(rng.integers(5, 18))] = 1.0
+    models, _, zone = heated(1500.0 * on)
+    models.drivers.switched = np.zeros_like(models.drivers.switched)
+    models.drivers.switched[:, 1] = on
+    fit = models.fit({"internal_gains": [zone]}, [{}])
+    assert fit.values[f"switched_heat@{zone}"] > 1000.0
+    told = agreement(fit)["internal_gains"]
+    first, second = (half[f"switched_heat@{zone}"] for half in told.estimates)
+    assert first > 5.0 * second and told.agrees
+
+
 def test_without_any_there_is_none_and_all_zones_have_no_equipment() -> None:
     models, fit, _ = heated(0.0)
     made = Screening(models, fit, SOUGHT)

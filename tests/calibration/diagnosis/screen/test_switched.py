@@ -48,6 +48,23 @@ def test_what_comes_by_the_clock_is_none() -> None:
     assert not switched_when(beyond(900.0 * daily, np.zeros(TIME.size)), STEP).any()
 
 
+def test_what_comes_by_the_week_is_none() -> None:
+    rng, day, hour = np.random.default_rng(7), TIME // DAY % 7, TIME % DAY * STEP / 3600.0
+    for days in ([1, 3], [2], [0]):
+        weekly = (np.isin(day, days) & (hour >= 8.0) & (hour < 13.0)).astype(float)
+        assert not switched_when(beyond(900.0 * weekly, np.zeros(TIME.size)), STEP).any()
+    assert switched_when(beyond(900.0 * switched(rng, 0.5), np.zeros(TIME.size)), STEP).any()
+
+
+def test_finer_telemetry_says_no_more_than_that_of_five_minutes() -> None:
+    short = np.zeros(TIME.size)
+    short[1000:1018] = 1.0
+    for on in (short, switched(np.random.default_rng(8))):
+        heat = beyond(900.0 * on, np.zeros(TIME.size))
+        seen, finer = switched_when(heat, STEP), switched_when(np.repeat(heat, 5, axis=0), STEP / 5.0)
+        assert np.array_equal(np.repeat(seen, 5, axis=0), finer)
+
+
 def test_what_many_zones_have_at_a_time_is_a_wrong_model() -> None:
     on = switched(np.random.default_rng(3))
     assert switched_when(beyond(900.0 * on, 0.0 * on), STEP).any()
