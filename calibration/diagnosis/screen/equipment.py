@@ -13,7 +13,7 @@ from thermal.parameters import Parameter
 EQUIPPED = INTERNAL_GAINS.id
 
 
-def always_on(parameters: Sequence[Parameter]) -> dict[Parameter, int]:
+def always_on(parameters: Sequence[Parameter], lacking: Collection[str]) -> dict[Parameter, int]:
     """Strengths of what is always on, with the positions of heat of unknown cause that has their sensitivities.
 
     Half of the one is radiated, and all of the other is in the air: a fit tells the difference.
@@ -22,6 +22,8 @@ def always_on(parameters: Sequence[Parameter]) -> dict[Parameter, int]:
     ----------
     parameters : sequence of Parameter
         Of a model with heat of unknown cause.
+    lacking : collection of str
+        Effects that are sought.
 
     Returns
     -------
@@ -30,19 +32,21 @@ def always_on(parameters: Sequence[Parameter]) -> dict[Parameter, int]:
     """
     kind = next(p for p in CATALOGUE[EQUIPPED].parameters if p.name == EQUIPMENT)
     at = {p.member: i for i, p in enumerate(parameters) if p.base == ZONE_HEAT and p.member is not None}
-    return {kind.of("zone", zone): i for zone, i in at.items()} if len(at) > 1 else {}
+    return {kind.of("zone", zone): i for zone, i in at.items()} if EQUIPPED in lacking and len(at) > 1 else {}
 
 
-def at_times(drivers: InputProvider, here: Collection[str]) -> list[Chosen]:
+def at_times(drivers: InputProvider, lacking: Collection[str], here: Collection[str]) -> list[Chosen]:
     """Heat that is seen to be switched, in the zones where it is.
 
     Parameters
     ----------
     drivers : InputProvider
         Of the case.
+    lacking : collection of str
+        Effects that are sought.
     here : collection of str
         Zones to which a search is confined; empty where it is not.
     """
     seen = (zone for zone, course in zip(drivers.zones, drivers.switched.T, strict=True) if course.any())
     where = tuple(zone for zone in seen if not here or zone in here)
-    return [Chosen(SWITCHED, where)] if where and len(drivers.zones) > 1 else []
+    return [Chosen(SWITCHED, where)] if where and EQUIPPED in lacking and len(drivers.zones) > 1 else []

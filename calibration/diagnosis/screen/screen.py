@@ -16,7 +16,7 @@ import numpy as np
 
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison, is_strength
 from calibration.diagnosis.screen.alike import alike
-from calibration.diagnosis.screen.equipment import EQUIPPED, always_on, at_times
+from calibration.diagnosis.screen.equipment import always_on, at_times
 from calibration.diagnosis.screen.gains import Gain, choice_of
 from calibration.diagnosis.screen.generic import GENERIC, TIGHTNESS, ZONE_HEAT
 from calibration.diagnosis.screen.programme import Programme
@@ -55,8 +55,7 @@ class Screening:
     def __init__(self, models: ModelComparison, fit: Fit, candidates: Sequence[str]) -> None:
         here = _worst_zones(fit)
         lacking = {e: here if CATALOGUE[e].zonal else () for e in candidates if e not in fit.effects}
-        switched = at_times(models.drivers, here) if EQUIPPED in lacking else []
-        built = models.build({**fit.effects, **lacking}, (Chosen(GENERIC, here), *switched))
+        built = models.build({**fit.effects, **lacking}, (Chosen(GENERIC, here), *at_times(models.drivers, lacking, here)))
         self._zones = len(built.network.zones)
         self.elsewhere = self._zones - len(here) if here else 0
         own: tuple[Parameter, ...] = built.network.parameters
@@ -75,7 +74,7 @@ class Screening:
             jacobian = np.column_stack([jacobian, jacobian[:, i] + (high - low) / little[i]])
         self._twins = {len(own) + k: i for k, i in enumerate(twice)}
         tied = {} if here else alike(own, [e for e in lacking if CATALOGUE[e].alike])
-        alone = always_on(own) if EQUIPPED in lacking else {}
+        alone = always_on(own, lacking)
         self._tied = range(len(own) + len(twice), len(own) + len(twice) + len(tied))
         jacobian = np.column_stack(
             [jacobian, *(jacobian[:, mine].sum(axis=1) for mine in tied.values()), jacobian[:, list(alone.values())]]

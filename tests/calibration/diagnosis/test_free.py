@@ -50,13 +50,13 @@ def twin() -> Case:
 
 
 def drawn_wrongly(building: Building) -> Building:
-    """The same zones, a quarter as large, joined to nothing but outdoor and ground."""
+    """The same zones, a quarter as large behind walls of 120 m2, joined to nothing but outdoor and ground."""
     rooms = ModelSettings(dx=1.0).network(building).anatomy.rooms
     zones, surfaces = [], []
     for name in building.zone_names:
         area = rooms[name].floor_area / 4.0
         zones.append(ZoneEntry(name=name, volume=2.7 * area, floor_area=area))
-        wall = {"kind": "wall", "other": OUTDOOR, "area": 30.0, "azimuth": 0.0}
+        wall = {"kind": "wall", "other": OUTDOOR, "area": 120.0, "azimuth": 0.0}
         floor = {"kind": "floor", "other": GROUND, "area": area}
         for part in (wall, floor):
             surfaces.append(Surface(name=f"{part['kind']} {name}", zone=name, construction="thin", **part))
