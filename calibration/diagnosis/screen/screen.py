@@ -55,9 +55,10 @@ class Screening:
     def __init__(self, models: ModelComparison, fit: Fit, candidates: Sequence[str]) -> None:
         here = _worst_zones(fit)
         lacking = {e: here if CATALOGUE[e].zonal else () for e in candidates if e not in fit.effects}
-        built = models.build({**fit.effects, **lacking}, (Chosen(GENERIC, here), *at_times(models.drivers, lacking, here)))
-        self._zones = len(built.network.zones)
-        self.elsewhere = self._zones - len(here) if here else 0
+        further = Chosen(GENERIC, here), *at_times(models.drivers, lacking, here)
+        built = models.build({**fit.effects, **lacking}, further)
+        self._total = len(built.network.zones)
+        self.elsewhere = self._total - len(here) if here else 0
         own: tuple[Parameter, ...] = built.network.parameters
         self._levels = {p.effect: p for p in own if p.effect in lacking and p.name == CATALOGUE[p.effect].level}
         levels = {p.name: (p.lower, p.upper) for p in self._levels.values()}
@@ -76,9 +77,8 @@ class Screening:
         tied = {} if here else alike(own, [e for e in lacking if CATALOGUE[e].alike])
         alone = always_on(own, lacking)
         self._tied = range(len(own) + len(twice), len(own) + len(twice) + len(tied))
-        jacobian = np.column_stack(
-            [jacobian, *(jacobian[:, mine].sum(axis=1) for mine in tied.values()), jacobian[:, list(alone.values())]]
-        )
+        sums = (jacobian[:, mine].sum(axis=1) for mine in tied.values())
+        jacobian = np.column_stack([jacobian, *sums, jacobian[:, list(alone.values())]])
         at_the_end = (replace(own[i], name=f"{own[i].name} at the other end") for i in twice)
         self.parameters = (*own, *at_the_end, *tied, *alone)
         self.jacobian = jacobian
@@ -183,9 +183,9 @@ class Screening:
         Parameters
         ----------
         zones : sequence of str
-            Names.
+            They.
         """
-        return len(zones) == self._zones
+        return len(zones) == self._total
 
     def members_of(self, effect: str) -> tuple[dict[str, IntArray], dict[tuple[str, ...], IntArray]]:
         """Positions of an effect's strengths by zone or pair of zones, those that show nothing left out.
