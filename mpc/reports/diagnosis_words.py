@@ -13,7 +13,7 @@ from calibration.diagnosis.screen.seen import WINDOWS
 from mpc.reports.correction_words import correction_sentence, faults_sentence
 from mpc.reports.evaluation import beside_sentence, carried_sentence, structure_words
 from mpc.reports.free_words import comes_back, free_sentence, known_effects
-from mpc.reports.page import duration, estimated_sentences, kelvin, listed, percent, sure, watts
+from mpc.reports.page import duration, estimated_sentences, kelvin, listed, percent, significant, sure, watts
 from thermal.effects.catalogue import CATALOGUE, effect_of, is_effect
 from thermal.effects.gains import SWITCHED_HEAT
 from thermal.inputs.provider import IRRADIANCE
@@ -54,6 +54,12 @@ def diagnosis_verdict(result: Diagnosis) -> str:
         text += (
             " No irradiance is measured: how bright a day was is estimated from the range of the outdoor temperature, "
             "so that the sun's size is rough."
+        )
+    if result.settings.structure.light_contents:
+        times = significant(result.final.values["air_capacity_multiplier"])
+        text += (
+            f" Rooms hold {times} times the heat that their air does, by light things that follow it within minutes; "
+            "sensors that lag would look alike."
         )
     if zoned := [name for name, scope in result.settings.scopes.items() if scope == "zone"]:
         what = [words for part, words in _OWN.items() if any(name.startswith(part) for name in zoned)]
