@@ -55,4 +55,4 @@ def test_a_model_that_is_outdone_leaves_something_out(models: ModelComparison, m
     monkeypatch.setattr("calibration.diagnosis.decide.outdone.MATTERS", 0.0)
     found = seek(models.case, dx=2.0)
     assert found.verdict.name == "unexplained" and found.outdone == pytest.approx(1e-3)
-    assert found.structures is not None and found.to_dict()["outdone"] == found.outdone
+    assert found.structures is not None and found.to_dict()["gap"]["outdone"] == found.outdone
