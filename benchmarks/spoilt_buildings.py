@@ -215,6 +215,8 @@ def read(out: Path) -> dict[str, tuple[dict[str, Any], Trial]]:
         twin = float("nan") if as_is is None else _error_with(as_is, own)
         answer = {**answer, "which": [c for c in answer["which"] if c["effect"] not in own]}
         answer["gap"] = {**answer["gap"], "mae": _error_with(answer, own)}
+        # that of the last third is without what is its own
+        answer["intervals"] = {**answer.get("intervals", {}), "mae_of_last_third": None}
         if set() < _effects_of(answer) <= own and answer["verdict"] != "unexplained":
             # nothing but what the building is known to have, or more that has no name
             answer["verdict"] = "no_gap" if answer["gap"].get("outdone") is None else "unexplained"
@@ -233,7 +235,7 @@ def _effects_of(answer: dict[str, Any]) -> set[str]:
 
 def _error_with(answer: dict[str, Any], own: set[str]) -> float:
     """Held-out error once what is the building's own is in the model [K]."""
-    error = gap_of(answer)
+    error = answer["gap"]["mae"]
     for step in answer["how_far"]:
         if not set(step["effects"]) <= own:
             break
