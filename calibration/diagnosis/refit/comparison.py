@@ -188,7 +188,7 @@ class Fit:
                 beyond[p.member] = max(beyond.get(p.member, 0.0), float(abs(z)) / deviation)
         return beyond
 
-    @property
+    @cached_property
     def told(self) -> frozenset[str]:
         """Names of the parameters of which the data tell anything: they are surer than before."""
         both = zip(self.problem.parameters, self.deviations.tolist(), strict=True)

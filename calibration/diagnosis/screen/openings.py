@@ -7,7 +7,7 @@ which was metered; a hidden Markov model of two states says when the difference 
 
 import numpy as np
 
-from calibration.diagnosis.screen.two_states import log_odds, most_likely_paths, noise_of, sudden_part
+from calibration.diagnosis.screen.two_states import likely_courses
 from thermal._types import FloatArray
 
 #: How often a window is opened while people are there and while nobody is, and shut again [1/h].
@@ -43,17 +43,9 @@ def opened_when(lost: FloatArray, unit: FloatArray, presence: FloatArray, step: 
     ndarray, shape (n_time, n_zone)
         1 where one stands open [-].
     """
-    hour, known = max(1.0, 3600.0 / step), np.isfinite(lost)
-    sudden, opened = sudden_part(lost, known, _SLOW, step), np.zeros(lost.shape)
-    sought = np.flatnonzero(known.sum(axis=0) >= 24 * hour)
-    if not sought.size:
-        return opened
-    there = presence > 0.05
-    opens, shuts = np.where(there, _OPENED, _OPENED_ALONE) / hour, min(_SHUT / hour, 0.5)
-    noise = [noise_of(sudden[known[:, k], k], unit[known[:, k], k]) for k in sought]
-    odds = [log_odds(sudden[:, k], known[:, k], unit[:, k], _AREAS, n) for k, n in zip(sought, noise, strict=True)]
-    paths, gains = most_likely_paths(np.hstack(odds), opens, shuts)
-    for k, mine, gained in zip(sought, np.split(paths, sought.size, axis=1), np.split(gains, sought.size), strict=True):
+    there, opened = presence > 0.05, np.zeros(lost.shape)
+    found = likely_courses(lost, unit, _AREAS, _SLOW, step, np.where(there, _OPENED, _OPENED_ALONE), _SHUT)
+    for k, mine, gained in zip(found.zones, np.moveaxis(found.paths, 1, 0), found.gains, strict=True):
         often = (mine.mean(axis=0) < _LONGEST) & (mine[there].sum(axis=0) > _PRESENT * mine.sum(axis=0))
         likely = np.where(often, gained, -np.inf)
         if likely.max() > _SEEN:

@@ -6,7 +6,7 @@ wrong comes by the clock, as set-backs do, and in many zones at a time.
 
 import numpy as np
 
-from calibration.diagnosis.screen.two_states import log_odds, most_likely_paths, noise_of, sudden_part
+from calibration.diagnosis.screen.two_states import likely_courses
 from thermal._types import BoolArray, FloatArray
 
 #: Step that the limits are for: finer telemetry is averaged [s]. Coarser says less, and by the hour nearly nothing.
@@ -51,24 +51,13 @@ def switched_when(brought: FloatArray, step: float) -> FloatArray:
         whole = len(brought) // each * each
         on = switched_when(brought[:whole].reshape(-1, each, brought.shape[1]).mean(axis=1), each * step)
         return np.vstack([np.repeat(on, each, axis=0), np.zeros((len(brought) - whole, brought.shape[1]))])
-    hour, known = max(1.0, 3600.0 / step), np.isfinite(brought)
-    sudden, on = sudden_part(brought, known, _SLOW, step), np.zeros(brought.shape)
-    sought = np.flatnonzero(known.sum(axis=0) >= 24 * hour)
-    if not sought.size:
-        return on
-    alike = np.ones(len(brought))
-    noise = np.array([noise_of(sudden[known[:, k], k], alike[known[:, k]]) for k in sought])
-    odds = [log_odds(sudden[:, k], known[:, k], alike, _POWERS, n) for k, n in zip(sought, noise, strict=True)]
-    begins, ends = np.full(len(brought), _ON / hour), min(_OFF / hour, 0.5)
-    paths, gains = most_likely_paths(np.hstack(odds), begins, ends)
-    paths, gains = paths.reshape(len(brought), sought.size, -1), gains.reshape(sought.size, -1)
-    gains = np.where(paths.mean(axis=0) < _LONGEST, gains, -np.inf)
-    best = np.argmax(gains, axis=1)
-    every = np.arange(sought.size)
-    likely, courses = gains[every, best], paths[:, every, best]
-    for k, zone in enumerate(sought):
-        course, own = courses[:, k] > 0.0, sudden[:, zone]
-        if likely[k] > _SEEN and own[course].mean() - own[~course].mean() > _CLEAR * noise[k]:
+    found = likely_courses(brought, np.ones(brought.shape), _POWERS, _SLOW, step, np.full(len(brought), _ON), _OFF)
+    gains, on = np.where(found.paths.mean(axis=0) < _LONGEST, found.gains, -np.inf), np.zeros(brought.shape)
+    best, every = np.argmax(gains, axis=1), np.arange(found.zones.size)
+    likely, courses = gains[every, best], found.paths[:, every, best]
+    for k, zone in enumerate(found.zones):
+        course, own = courses[:, k] > 0.0, found.sudden[:, zone]
+        if likely[k] > _SEEN and own[course].mean() - own[~course].mean() > _CLEAR * found.noise[k]:
             others = np.delete(courses, k, axis=1) > 0.0
             if _told_by_clock(courses[:, k], step) < _BY_CLOCK and _shared(course, others) < _SHARED:
                 on[:, zone] = courses[:, k]

@@ -1,9 +1,11 @@
 """Hidden Markov models of two states: when heat beyond a model is that of something which is on or off."""
 
+from typing import NamedTuple
+
 import numpy as np
 import pandas as pd
 
-from thermal._types import BoolArray, FloatArray
+from thermal._types import BoolArray, FloatArray, IntArray
 
 #: Deviations within which 90 % of a normal distribution are [-].
 _NINETY = 1.645
@@ -69,6 +71,62 @@ def log_odds(sudden: FloatArray, known: BoolArray, unit: FloatArray, sizes: Floa
     off, on = (1.0 + (e / noise) ** 2 / _FREEDOM for e in (first, first - sizes * unit[:, None]))
     more = 0.5 * (_FREEDOM + 1.0) * np.log(off / on)
     return np.where(known[:, None], np.clip(more, -_MOST, _MOST), 0.0)
+
+
+class Courses(NamedTuple):
+    """Most likely courses of each zone whose heat is known for a day at least.
+
+    Parameters
+    ----------
+    zones : ndarray of int, shape (n_zone,)
+        Which.
+    sudden : ndarray, shape (n_time, n_all)
+        Heat of all zones less what is slow [W].
+    noise : ndarray, shape (n_zone,)
+        Deviation of what is sudden [W].
+    paths : ndarray, shape (n_time, n_zone, n_size)
+        The courses, 1 while on [-].
+    gains : ndarray, shape (n_zone, n_size)
+        What each gains in log-likelihood over one that stays 0 [-].
+    """
+
+    zones: IntArray
+    sudden: FloatArray
+    noise: FloatArray
+    paths: FloatArray
+    gains: FloatArray
+
+
+def likely_courses(
+    heat: FloatArray, unit: FloatArray, sizes: FloatArray, hours: float, step: float, on: FloatArray, off: float
+) -> Courses:
+    """Find when heat of each zone is on, for each of some sizes that it may have.
+
+    Parameters
+    ----------
+    heat : ndarray, shape (n_time, n_all)
+        Beyond a model [W]; NaN where it is not known.
+    unit : ndarray, shape (n_time, n_all)
+        Heat of a member of size 1 [W per size].
+    sizes : ndarray, shape (n_size,)
+        That are tried [-].
+    hours : float
+        Of the running median that is slow [h].
+    step : float
+        Of the telemetry [s].
+    on : ndarray, shape (n_time,)
+        How often it is switched on [1/h].
+    off : float
+        How often it is switched off [1/h].
+    """
+    hour, known = max(1.0, 3600.0 / step), np.isfinite(heat)
+    sudden, zones = sudden_part(heat, known, hours, step), np.flatnonzero(known.sum(axis=0) >= 24 * hour)
+    noise = np.array([noise_of(sudden[known[:, k], k], unit[known[:, k], k]) for k in zones])
+    odds = [log_odds(sudden[:, k], known[:, k], unit[:, k], sizes, n) for k, n in zip(zones, noise, strict=True)]
+    none = np.empty((len(heat), 0))
+    paths, gains = most_likely_paths(np.hstack([none, *odds]), on / hour, min(off / hour, 0.5))
+    shape = zones.size, sizes.size
+    return Courses(zones, sudden, noise, paths.reshape(len(heat), *shape), gains.reshape(shape))
 
 
 def most_likely_paths(odds: FloatArray, opens: FloatArray, shuts: float) -> tuple[FloatArray, FloatArray]:
