@@ -1,9 +1,10 @@
 """Our components beside EnergyPlus' of the same kind over a year in Chicago, one by one.
 
-EnergyPlus runs two models of ours: plant components on a loop of their own under a load that goes with the weather, and
-boxes of 100 m2 each heated and cooled by one kind of unit. Ours get what EnergyPlus' component meets in each quarter of
-an hour - weather, zone air, water, the load or the share of time that it runs - and the same ratings and curves. What
-is compared is the energy that follows over the year. Thermostats and the buildings themselves are not.
+EnergyPlus runs three models of ours: plant components on a loop of their own under a load that goes with the weather,
+boxes of 100 m2 each heated and cooled by one kind of unit, and a box in the sun with a pane a side. Ours get what
+EnergyPlus' component meets in each quarter of an hour - weather, zone air, water, the load or the share of time that it
+runs - and the same ratings and curves. What is compared is the energy that follows over the year. Thermostats and the
+buildings themselves are not.
 
 Run: ``python benchmarks/components_energyplus.py --out results/components [--publish]`` with the extra
 ``[energyplus]``; a minute on one core. Writes ``components_energyplus.json`` and ``.md``; with ``--publish`` also the
@@ -18,6 +19,7 @@ import tempfile
 from pathlib import Path
 
 import _component_plants
+import _component_sun
 import _component_zones
 from _component_models import Row
 from _hvac_reference import WEATHER, ReferenceRunError
@@ -25,9 +27,9 @@ from _table import markdown, write
 
 
 def compared() -> list[Row]:
-    """Run both models and ours."""
+    """Run EnergyPlus' models and ours."""
     found = []
-    for part in (_component_plants, _component_zones):
+    for part in (_component_plants, _component_zones, _component_sun):
         with tempfile.TemporaryDirectory(prefix="energyplus_") as folder:
             found += part.compared(Path(folder))
     return found

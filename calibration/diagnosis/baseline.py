@@ -1,6 +1,6 @@
 """The baseline of a diagnosis: as drawn, with films, contents and emitters by the evidence, which no case says."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from calibration.diagnosis.decide.levels import APART
@@ -8,14 +8,8 @@ from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.fit.fitted_case import is_large
 from calibration.fit.ladder import fit_emitter
 from calibration.fit.left_out import values_of
+from calibration.fit.undrawn import BY_EVIDENCE, UNDRAWN, is_another
 from calibration.progress import Progress
-from thermal.network.structure import Structure
-
-#: Parts of a structure that drawings do not tell, in the order in which they are tried.
-_UNDRAWN: tuple[Callable[[Structure], Structure], ...] = (
-    lambda structure: replace(structure, natural_films=True),
-    lambda structure: replace(structure, light_contents=True),
-)
 
 
 def fit_baseline(
@@ -44,14 +38,13 @@ def fit_baseline(
     known = {name: tuple(zones) for name, zones in effects.items()}
     found = models.fit(known, [{}])
     if not is_large(models.case.building.zone_names) and not models.settings.structure.lumped:
-        for undrawn in _UNDRAWN:
-            structure = undrawn(models.settings.structure)
+        for name in BY_EVIDENCE:
+            structure = UNDRAWN[name].put(models.settings.structure)
             nearer = replace(models, settings=replace(models.settings, structure=structure))
             nearer.drivers = models.drivers
             built = nearer.build(known)
-            sizes = {(len(n.signals), len(n.parameters)) for n in (built.network, found.built.network)}
-            if len(sizes) == 1:
-                continue  # nothing of this building does
+            if not is_another(built.network, found.built.network):
+                continue
             if (other := nearer.fit(known, [found.values], built)).evidence > found.evidence + APART:
                 models, found = nearer, other
     heated = fit_emitter(found.known, models, known, progress)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Protocol
@@ -14,6 +14,7 @@ from calibration.fit.least_squares import INTERRUPTED
 from calibration.fit.left_out import Fitted, Known, LeftOut, begin_at, left_out
 from calibration.fit.problem import tuning_problem
 from calibration.fit.result import CalibrationResult, Rung
+from calibration.fit.undrawn import FEW_MORE, UNDRAWN, is_another
 from calibration.progress import Forward, Progress
 from calibration.stages import stage
 from thermal.case.building import Building, ZoneTable
@@ -35,9 +36,8 @@ MASSES = ("slab_heat_capacity", "slab_coupling", "furniture_heat_capacity", "fur
 #: The same of what lies between rooms and outdoor, where a drawing is no survey: areas and layers of each room differ.
 LOSSES = ("exterior_wall_conductivity_multiplier", "window_conductance_multiplier", "window_u_value")
 
-#: What coarse telemetry of a free structure may need, readings at an instant of their step beside means of it, and the
-#: share by which it must do better [-]: two parameters more; of three measured houses and the Twin Houses one has it.
-CLOCK, _MOVED = "clock_shift", 0.05
+#: What coarse telemetry of a free structure may need, readings at an instant of their step beside means of it.
+CLOCK = "clock_shift"
 
 #: Share of the drawing's error on left-out days below which a lumped model's says that more than masses is wrong [-].
 _WRONG = 0.5
@@ -55,14 +55,6 @@ _EMITTERS: tuple[Unknown, Unknown] = ("floor", "radiator")
 
 #: Tuning days from which a gain that recurs from day to day is looked for [days]: it has to recur.
 _WEEK = 7.0
-
-#: What no drawing tells, by the name of the structure: what must be known, what the structure then has, and the share
-#: by which it must do better [-]: films that follow something have no more parameters, contents have one.
-_UNDRAWN: dict[str, tuple[str, Callable[[Structure], Structure], float]] = {
-    "natural convection": ("heat", lambda structure: replace(structure, natural_films=True), 0.0),
-    "light contents": ("heat", lambda structure: replace(structure, light_contents=True), _MOVED),
-    "wind": ("wind", lambda structure: replace(structure, wind_films=True), 0.0),
-}
 
 #: Structures without a drawing.
 _LUMPED = ("lumped", "lumped floor", "recurring")
@@ -238,14 +230,13 @@ def climb_from(
     free = ladder.lumped(Structure(lumped=True, sun=source.gives("sun")), looked[best].left.mae)
     drawn = min(each.left.mae for each in free) >= _WRONG * looked[best].left.mae
     least = looked[best].left.mae
-    for name, (signal, other, better) in _UNDRAWN.items() if plain and drawn else ():
-        follows = replace(base, structure=other(base.structure))
-        if follows.structure != base.structure and source.gives(signal):
+    for name, part in UNDRAWN.items() if plain and drawn else ():
+        follows = replace(base, structure=part.put(base.structure))
+        if follows.structure != base.structure and source.gives(part.signal):
             begins = _begun(given, follows, fitted)
-            networks = [each.problem.grid.network for each in (begins, fitted)]
-            if len({(len(n.signals), len(n.parameters)) for n in networks}) == 1:
-                continue  # nothing of this building does
-            if (seen := ladder.look(name, begins)).left.mae < (1.0 - better) * least:
+            if not is_another(begins.problem.grid.network, fitted.problem.grid.network):
+                continue
+            if (seen := ladder.look(name, begins)).left.mae < (1.0 - part.better) * least:
                 looked.append(seen)
                 least, begun[name], base, fitted = seen.left.mae, (follows, fitted), follows, begins
     differing = set(chain(*by_zone(given.case.building)))
@@ -266,7 +257,7 @@ def climb_from(
         moved = replace(kept.fit.settings, effects={CLOCK: ()})
         # fitted at once: Newton steps from heat that is not moved at all tell nothing of half an hour
         looked.append(ladder.fitted("shifted", moved, kept.fit.best))
-        kept = looked[-1] if looked[-1].left.mae < (1.0 - _MOVED) * kept.left.mae else kept
+        kept = looked[-1] if looked[-1].left.mae < (1.0 - FEW_MORE) * kept.left.mae else kept
     rungs = tuple(Rung(each.name, each.left.mae, each.parameters, each is kept) for each in looked)
     return rungs, None if kept.fit is None else replace(kept.fit, left=kept.left), kept.left
 
@@ -276,7 +267,7 @@ def _best(looked: Sequence[_Looked], advance: float, lumped_advance: float = ADV
     best = 0
     for number, other in enumerate(looked):
         over_the_first = lumped_advance if other.name in _LUMPED else advance
-        least = _UNDRAWN[other.name][2] if other.name in _UNDRAWN else ADVANCE if best else over_the_first
+        least = UNDRAWN[other.name].better if other.name in UNDRAWN else ADVANCE if best else over_the_first
         if other.left.mae < (1.0 - least) * looked[best].left.mae:
             best = number
     return best

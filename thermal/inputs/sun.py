@@ -13,13 +13,11 @@ from thermal.errors import EffectError
 #: Reflectance of the ground [-]: grass and worn concrete (ASHRAE Fundamentals 2017, ch. 14, table 5).
 GROUND_REFLECTANCE = 0.2
 
-#: Modifier of diffuse light through double glazing relative to normal incidence [-] (ISO 15099; ASHRAE Fundamentals
-#: 2017, ch. 15, table 10).
+#: Solar heat gain through double glazing of clear panes by angle of incidence [deg], and of diffuse light, relative to
+#: normal incidence [-] (ASHRAE Fundamentals 2017, ch. 15, table 10, glazing 5a: 0.76 at normal incidence).
+_ANGLES = (0.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0)
+_BY_ANGLE = (1.0, 0.74 / 0.76, 0.71 / 0.76, 0.64 / 0.76, 0.50 / 0.76, 0.26 / 0.76, 0.0)
 GLASS_DIFFUSE = 0.86
-
-#: Coefficient b0 of the incidence angle modifier ``1 - b0 (1 / cos θ - 1)`` of double glazing [-] (Souka and Safwat
-#: 1966; ASHRAE 93; 0.1 to 0.17 for two panes).
-_INCIDENCE = 0.13
 
 #: Below this altitude the sun counts as set: beams divided by its sine are noise [deg].
 _LOWEST = 3.0
@@ -39,15 +37,14 @@ _FORECAST = 2 * _DAY
 
 
 def incidence_modifier(cosine: FloatArray) -> FloatArray:
-    """Transmittance of double glazing at an angle of incidence relative to that at normal incidence [-].
+    """Solar heat gain of double glazing at an angle of incidence relative to that at normal incidence [-].
 
     Parameters
     ----------
     cosine : ndarray
         Cosine of the angle of incidence [-]; 0 or less is behind the pane.
     """
-    safe = np.maximum(cosine, 1e-3)
-    return np.where(cosine > 0.0, np.clip(1.0 - _INCIDENCE * (1.0 / safe - 1.0), 0.0, 1.0), 0.0)
+    return np.interp(np.degrees(np.arccos(np.clip(cosine, 0.0, 1.0))), _ANGLES, _BY_ANGLE)
 
 
 @dataclass(frozen=True)
@@ -60,6 +57,8 @@ class Sun:
         Of the sun, at the middle of the step [deg].
     normal, diffuse, horizontal : ndarray, shape (n_time,)
         Beam on a plane that faces the sun, diffuse and total on the horizontal [W/m2].
+    above : ndarray, shape (n_time,)
+        Beam outside of the atmosphere on a plane that faces the sun [W/m2].
     """
 
     azimuth: FloatArray
@@ -67,6 +66,7 @@ class Sun:
     normal: FloatArray
     diffuse: FloatArray
     horizontal: FloatArray
+    above: FloatArray
 
     def cosine(self, azimuth: float, tilt: float) -> FloatArray:
         """Cosine of the angle of incidence on a plane, negative behind it [-].
@@ -81,17 +81,24 @@ class Sun:
         return np.asarray(aoi_projection(tilt, azimuth, 90.0 - self.altitude, self.azimuth), dtype=float)
 
     def plane(self, azimuth: float, tilt: float) -> tuple[FloatArray, FloatArray]:
-        """Beam and diffuse irradiance on a plane; the diffuse part is isotropic sky and ground (Liu and Jordan 1963).
+        """Beam and diffuse irradiance on a plane: sky that is brighter about the sun and at the horizon, and ground.
+
+        The sky is that of Perez et al. (1990), doi:10.1016/0038-092X(90)90055-H, as in EnergyPlus: on a clear day a
+        facade in the sun gets twice the diffuse light of an isotropic sky. Where the sun is down there is none.
 
         Parameters
         ----------
         azimuth, tilt : float
             Of the plane's normal [deg].
         """
-        beam = self.normal * np.maximum(self.cosine(azimuth, tilt), 0.0)
-        up = np.cos(np.radians(tilt))
-        diffuse = self.diffuse * (1.0 + up) / 2.0 + GROUND_REFLECTANCE * self.horizontal * (1.0 - up) / 2.0
-        return beam, np.asarray(diffuse)
+        from pvlib import atmosphere, irradiance
+
+        beam, zenith = self.normal * np.maximum(self.cosine(azimuth, tilt), 0.0), 90.0 - self.altitude
+        mass = atmosphere.get_relative_airmass(zenith)
+        told = self.diffuse, self.normal, self.above, zenith, self.azimuth, mass
+        sky = np.nan_to_num(np.asarray(irradiance.perez(tilt, azimuth, *told), dtype=float))
+        ground = GROUND_REFLECTANCE * self.horizontal * (1.0 - np.cos(np.radians(tilt))) / 2.0
+        return beam, np.asarray(sky + ground)
 
     def through_glass(self, azimuth: float, tilt: float) -> FloatArray:
         """Irradiance that glass lets through relative to normal incidence, ``IAM I_b + 0.86 I_d`` [W/m2].
@@ -161,7 +168,7 @@ def sun_of(location: Location, stamps: pd.DatetimeIndex, step: float, weather: p
         normal = np.where(up, np.maximum(total - diffuse, 0.0) / np.maximum(rise, np.sin(np.radians(_LOWEST))), 0.0)
     else:
         normal, diffuse = _split(total, altitude, middle)
-    return Sun(azimuth, altitude, np.asarray(normal), np.asarray(diffuse), np.asarray(total))
+    return Sun(azimuth, altitude, np.asarray(normal), np.asarray(diffuse), np.asarray(total), _above(middle))
 
 
 def estimated_sun(location: Location, stamps: pd.DatetimeIndex, step: float, outdoor: FloatArray) -> Sun:
@@ -181,18 +188,23 @@ def estimated_sun(location: Location, stamps: pd.DatetimeIndex, step: float, out
     outdoor : ndarray, shape (n_time,)
         Outdoor temperature [K].
     """
-    from pvlib import irradiance
-
     middle = stamps - pd.Timedelta(seconds=step / 2.0)
     azimuth, altitude = _place(location, middle)
     days = pd.Series(outdoor).groupby(np.asarray(middle.normalize().asi8))
     length, range_ = days.count(), days.max() - days.min()
     usual = float(range_[length == length.max()].median())  # of a day that is cut off the range is unknown
     spread = range_.where(length == length.max(), usual)[np.asarray(middle.normalize().asi8)].to_numpy(dtype=float)
-    above = np.asarray(irradiance.get_extra_radiation(middle.day_of_year), dtype=float)
+    above = _above(middle)
     clear = np.clip(_BY_RANGE * np.sqrt(spread), _DARK, _CLEAR)
     total = np.where(altitude > 0.0, clear * above * np.sin(np.radians(altitude)), 0.0)
-    return Sun(azimuth, altitude, *_split(total, altitude, middle), total)
+    return Sun(azimuth, altitude, *_split(total, altitude, middle), total, above)
+
+
+def _above(middle: pd.DatetimeIndex) -> FloatArray:
+    """Beam outside of the atmosphere [W/m2]."""
+    from pvlib import irradiance
+
+    return np.asarray(irradiance.get_extra_radiation(middle.day_of_year), dtype=float)
 
 
 def _place(location: Location, middle: pd.DatetimeIndex) -> tuple[FloatArray, FloatArray]:

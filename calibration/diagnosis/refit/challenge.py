@@ -1,11 +1,12 @@
-"""Challenge of what a search found: masses or losses of each zone's own, which no instrument is to blame for.
+"""Challenge of what a search found: what no instrument is to blame for, and no drawing tells.
 
 A drawing has one value for the slabs and furniture of all zones, and zones differ in them; one that is no survey is
 wrong in what lies between rooms and outdoor, too. What that leaves is taken for a meter that is wrong zone by zone, and
-gains as much as a true one.
+gains as much as a true one. Films and light contents are chosen before anything is sought, when what is missing may
+hide them: then sensors seem to lag once it is found.
 """
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from copy import copy
 from dataclasses import replace
@@ -17,14 +18,16 @@ from calibration.diagnosis.refit.comparison import Effects, Fit, ModelComparison
 from calibration.diagnosis.refit.refit import ACCEPTED, held_out
 from calibration.diagnosis.refit.search import Round, search
 from calibration.errors import CalibrationError
+from calibration.evaluation.settings import ModelSettings
 from calibration.fit.fitted_case import is_large
 from calibration.fit.ladder import by_zone
+from calibration.fit.undrawn import BY_EVIDENCE, UNDRAWN, is_another
 from calibration.progress import Progress
 from thermal.errors import ModelError
 from thermal.parameters import Scope
 
-#: Effects that give a zone a part of its metered heat more or less, as another mass of the zone seems to.
-_LIKE_MASSES = frozenset({"flow_gain", "duct_loss", "capacity_limit"})
+#: Effects that give a zone a part of its metered heat more or less, as another mass of the zone seems to, or later.
+_LIKE_MASSES = frozenset({"flow_gain", "duct_loss", "capacity_limit", "sensor_lag"})
 
 #: What says itself that masses are not as drawn.
 _MASS = "hidden_mass"
@@ -36,11 +39,13 @@ _FAILURES = (ArithmeticError, np.linalg.LinAlgError, CalibrationError, ModelErro
 def challenge(
     models: ModelComparison, rounds: Sequence[Round], candidates: Sequence[str], progress: Progress | None = None
 ) -> tuple[ModelComparison, tuple[Round, ...]]:
-    """Search anew about a building with masses or losses by zone, where these are better evidence than what was found.
+    """Search anew about a building in another structure, where that is better evidence than what was found.
+
+    With masses by zone, with losses by zone where the drawing is no survey, or with films or light contents.
 
     They are weighed against what was found, alone and beside as much of it as does not act as masses do: what zones
     differ in takes further effects to imitate, and hides what is missing. Where something is left that no effect
-    explains, they are weighed against nothing. Losses by zone have a say where the drawing is no survey.
+    explains, they are weighed against nothing. A building of one zone has no others to differ from.
 
     Parameters
     ----------
@@ -60,12 +65,12 @@ def challenge(
     """
     final, zones = rounds[-1].after, models.case.building.zone_names
     told = judge(rounds, {}).name != "no_gap" and _MASS not in final.effects
-    if len(zones) < 2 or is_large(zones) or not told:
+    if is_large(zones) or not told:
         return models, tuple(rounds)
     known = dict(rounds[0].before.effects)
-    zoned = list(_zoned(models, {p.base for p in rounds[0].before.built.network.parameters}))
+    others = list(_others(models, rounds[0].before))
     for effects, least in _rivals(rounds, known):
-        fits = [(own, _fit(own, effects, final, least)) for own in zoned]
+        fits = [(own, _fit(own, effects, final, least)) for own in others]
         better = [(own, fit) for own, fit in fits if fit is not None and fit.evidence >= least]
         for own, other in sorted(better, key=lambda found: -found[1].evidence):
             with suppress(*_FAILURES):
@@ -87,16 +92,24 @@ def _fit(models: ModelComparison, effects: Effects, final: Fit, least: float) ->
         return None
 
 
-def _zoned(models: ModelComparison, drawn: Collection[str]) -> Iterator[ModelComparison]:
-    """Give each zone a value of its own of what a drawing has one of."""
-    own = models.settings.scopes
-    for names in by_zone(models.case.building):
-        scopes: dict[str, Scope] = {name: "zone" for name in names if name in drawn and name not in own}
+def _others(models: ModelComparison, drawn: Fit) -> Iterator[ModelComparison]:
+    """Give each zone a value of its own of what a drawing has one of, or the building what no drawing tells."""
+    settings, told = models.settings, {p.base for p in drawn.built.network.parameters}
+    for names in by_zone(models.case.building) if len(models.case.building.zone_names) > 1 else ():
+        scopes: dict[str, Scope] = {name: "zone" for name in names if name in told and name not in settings.scopes}
         if scopes:
-            settings = replace(models.settings, scopes={**own, **scopes})
-            zoned = replace(models, settings=settings, tune=models.tuned, hold_out=models.judged)
-            zoned.drivers = copy(models.drivers)  # a search may see other windows open about it
-            yield zoned
+            yield _in(models, replace(settings, scopes={**settings.scopes, **scopes}))
+    for name in BY_EVIDENCE:
+        other = _in(models, replace(settings, structure=UNDRAWN[name].put(settings.structure)))
+        if is_another(other.build(drawn.effects).network, drawn.built.network):
+            yield other
+
+
+def _in(models: ModelComparison, settings: ModelSettings) -> ModelComparison:
+    """Give the case in another structure, on the same days."""
+    other = replace(models, settings=settings, tune=models.tuned, hold_out=models.judged)
+    other.drivers = copy(models.drivers)  # a search may see other windows open about it
+    return other
 
 
 def _rivals(rounds: Sequence[Round], known: Effects) -> Iterator[tuple[Effects, float]]:

@@ -1,4 +1,4 @@
-"""Masses and losses by zone against meters that are wrong by zone: twins of either kind, and what a search is told."""
+"""Masses, losses and light contents against instruments that are wrong: twins of either kind, what a search is told."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -17,6 +17,7 @@ from thermal.case.case import Case
 from thermal.case.telemetry import Telemetry
 from thermal.pilot.building import pilot_building
 from thermal.pilot.twin import TwinRanges, TwinSettings, generate_twin
+from thermal.units import air_density
 
 
 def office(*by_zone: str, quality: GeometryQuality = "approximate") -> Case:
@@ -29,6 +30,16 @@ def office(*by_zone: str, quality: GeometryQuality = "approximate") -> Case:
         scopes=dict.fromkeys(by_zone, "zone"),
     )  # fmt: skip
     return generate_twin(building, 4, settings)[0]
+
+
+def full_of_light_things(monkeypatch: pytest.MonkeyPatch) -> Case:
+    """A twin in which three times as much as the air follows it at once."""
+    building = pilot_building(5, floor_area=80.0, zones=2, floors=1, name="office")
+    quiet = TwinRanges(noise=(0.01, 0.02), disturbance_deviation=(0.02, 0.05))
+    settings = TwinSettings(days=14.0, step_seconds=300.0, dx=1.0, meter="exact", ranges=quiet)
+    with monkeypatch.context() as heavy:
+        heavy.setattr("thermal.network.build.air_density", lambda elevation: 3.0 * air_density(elevation))
+        return generate_twin(building, 5, settings)[0]
 
 
 def wrong_meters(case: Case) -> Case:
@@ -82,7 +93,23 @@ def test_losses_by_zone_take_it_where_the_drawing_is_no_survey(
     models = ModelComparison(office("window_u_value", quality=quality), ModelSettings(dx=1.0))
     again, _ = challenge(models, accepted(models), ["flow_gain"])
     assert len(told) == 1
-    assert set(again.settings.scopes) == ({"window_u_value"} if quality == "approximate" else set(MASSES))
+    assert ("window_u_value" in again.settings.scopes) is (quality == "approximate")
+
+
+def test_light_contents_take_it_from_sensors_that_lag(
+    told: list[tuple[ModelComparison, Fit]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    models = ModelComparison(full_of_light_things(monkeypatch), ModelSettings(dx=1.0))
+    before = models.fit({}, [{}])
+    after = models.fit({"sensor_lag": ()}, [before.values])
+    gain = after.evidence - before.evidence
+    lag: Any = SimpleNamespace(before=before, after=after, accepted=named("sensor_lag", gain))
+    assert gain > 3.0
+    again, _ = challenge(models, [lag], ["sensor_lag"])
+    ((_, baseline),) = told
+    assert again.settings.structure.light_contents and not again.settings.scopes
+    assert not baseline.effects and baseline.evidence > after.evidence
+    assert baseline.values["air_capacity_multiplier"] == pytest.approx(3.0, rel=0.1)
 
 
 def test_a_search_that_stops_short_of_what_was_found_is_not_taken(
