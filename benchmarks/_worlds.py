@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any, Protocol, cast
 
 #: Package of each world by its name on the command line; its module ``world`` holds what `World` lists.
-PACKAGES = {"office": "energyplus_trials", "house": "house_trials", "reference": "reference_trials"}
+PACKAGES = {"office": "energyplus_trials", "house": "house_trials", "reference": "reference_trials",
+            "ideal_air": "ideal_air_trials"}  # fmt: skip
 
 
 class Drawn(Protocol):

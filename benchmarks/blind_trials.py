@@ -1,7 +1,8 @@
 """Blind trials of the diagnosis: buildings with effects switched on one by one, in pairs, or not at all.
 
 There are several worlds of buildings, made by packages that share no code for the building: `office`, offices drawn
-from a seed in EnergyPlus (`energyplus_trials`), and `reference`, EnergyPlus' reference buildings (`reference_trials`).
+from a seed in EnergyPlus (`energyplus_trials`), `house`, houses with people in them (`house_trials`), `reference`,
+EnergyPlus' reference buildings (`reference_trials`), and `ideal_air`, offices of another maker (`ideal_air_trials`).
 `make` draws trials from seeds and makes them. What the diagnosis may see goes to `DIR/cases/NAME`, what a trial truly
 holds to `DIR/sealed/NAME.json`; names tell nothing. Seeds of development and of confirmation are streams of their own,
 so that no trial of one is ever in the other; trials of one seed share building, weather, use and noise, so that the
@@ -18,6 +19,7 @@ Run from the repository's root, in an environment with Python 3.11 or newer::
     python benchmarks/blind_trials.py diagnose --out results/blind
     python benchmarks/blind_trials.py score --out results/blind
     python benchmarks/blind_trials.py make --world reference --out results/reference --kind all --seeds 0-9
+    python benchmarks/blind_trials.py make --world ideal_air --out results/ideal_air --kind all --seeds 0-9
     python benchmarks/blind_trials.py worlds --out results/blind results/reference results/spoilt   # by world
 
 `diagnose` answers each trial in a process of its own, which gets the case folder and nothing else; `score` opens the
