@@ -154,6 +154,13 @@ class Trial:
         return self.named and not self.right_group
 
     @property
+    def further_wrong(self) -> bool:
+        """Whether something is accepted beside the first name that is not there; what is a building's own may be."""
+        first, *others = (s["effect"] for s in self.answer["which"])
+        accepted = {e for step in self.answer["how_far"] for e in step["effects"]} & set(others) - {first}
+        return any(not self.holds([e]) for e in accepted)
+
+    @property
     def covered(self) -> bool:
         """Whether the 90 % set holds all effects that leave a gap."""
         inside = self.answer["set90"]
@@ -289,6 +296,7 @@ def score(trials: Sequence[Trial]) -> dict[str, Any]:
         "named right": _rate(t.named and t.right_group for t in singles),
         "abstained": _rate(not t.named for t in singles),
         "wrong name, of all trials": _rate(t.wrong_name for t in trials),
+        "a wrong one beside a right name": _rate(t.further_wrong for t in inside if t.named and t.right_first),
         "outside called unexplained": _rate(_outside_right(t) for t in outside),
         "both of a pair in the first two": _rate(_both(t) for t in pairs if len(t.shown) > 1),
         "one of a pair first": _rate(t.right_first for t in pairs),

@@ -23,6 +23,7 @@ _COLUMNS = {
     "right group": "right group",
     "abstained": "abstained",
     "wrong names of all": "wrong name, of all trials",
+    "a wrong one beside a right name": "a wrong one beside a right name",
     "90 % sets cover": "90 % set covers",
     "outside unexplained": "outside called unexplained",
 }
@@ -45,7 +46,9 @@ def failure(t: Trial) -> str:
         return "wrong name"
     if not t.named:
         return "abstained, right first" if t.right_first else "abstained"
-    return "" if t.right_first else "in the group, not first"
+    if not t.right_first:
+        return "in the group, not first"
+    return "a wrong one beside it" if t.further_wrong else ""
 
 
 def failures(trials: Sequence[Trial]) -> list[list[str]]:

@@ -35,6 +35,9 @@ _FEW_RUNS = 40
 #: Times over which a regression sees how much a zone has warmed before its start [s].
 _LAGS = (3600.0, 10800.0)
 
+#: Why nothing can be fitted where it is so.
+_UNSEEN = "no zone is measured on the tuning days"
+
 #: Where solar irradiance is measured on the horizontal.
 _GLOBAL = "global_horizontal_irradiance_sensor"
 
@@ -69,40 +72,24 @@ def with_yardsticks(
     Evaluation
         The same with its yardsticks.
     """
-    began, reasons = time.perf_counter(), {}
-    judged = [
-        (runs, p.measured[:, -1])
-        for p in evaluation.predictions
-        if (runs := select_runs(inputs, p.interval, evaluation.steps, spin_up=spin_up_seconds)).starts.size
-    ]
-    seen = _seen(inputs, tuned)
-    held = [inputs.held[runs.starts] for runs, _ in judged]
-    found: dict[str, float | None] = {
-        "persistence": _mae([inputs.bridged[runs.starts] for runs, _ in judged], [t for _, t in judged])
-    }
-    simple = None
+    began, reasons, zones = time.perf_counter(), dict[str, str](), _seen(inputs, tuned)
+    runs = _runs_of(evaluation, inputs, spin_up_seconds)
+    last = [inputs.bridged[r.starts] - p.measured[:, -1] for r, p in zip(runs, evaluation.predictions, strict=True)]
+    found: dict[str, float | None] = {"persistence": _mae(last), "arx": None, "rc": None}
     if not tuned:
         reasons = dict.fromkeys(("arx", "rc"), "all the telemetry is evaluated, so none is left to fit it to")
-    elif not seen.any():
-        reasons = dict.fromkeys(("arx", "rc"), "no zone is measured on the tuning days")
+    elif not zones.any():
+        reasons = dict.fromkeys(("arx", "rc"), _UNSEEN)
     else:
-        simple = _SimpleModels(case, inputs, anatomy, seen, evaluation.steps)
-    for name in ("arx", "rc"):
-        found[name] = None
-        if simple is None:
-            continue
-        try:
-            method = simple.regression if name == "arx" else simple.network
-            predicted = method(tuned, [runs for runs, _ in judged], spin_up_seconds)
-        except (NotEnoughDataError, np.linalg.LinAlgError) as error:
-            reasons[name] = str(error)
-            continue
-        whole = [h.copy() for h in held]
-        for full, own in zip(whole, predicted, strict=True):
-            full[:, seen] = own
-        found[name] = _mae(whole, [t for _, t in judged])
-        if simple.remarks:
-            reasons[name] = "; ".join(simple.remarks)
+        simple = _SimpleModels(case, inputs, anatomy, zones, evaluation.steps)
+        for name, method in (("arx", simple.regression), ("rc", simple.network)):
+            try:
+                found[name] = _mae(_errors(evaluation, inputs, zones, runs, method(tuned, runs, spin_up_seconds)))
+            except (NotEnoughDataError, np.linalg.LinAlgError) as error:
+                reasons[name] = str(error)
+                continue
+            if simple.remarks:
+                reasons[name] = "; ".join(simple.remarks)
     seconds = time.perf_counter() - began
     return replace(evaluation, yardsticks=Yardsticks(**found, reasons=reasons, seconds=seconds))  # type: ignore[arg-type]
 
@@ -129,14 +116,27 @@ def regression_errors(
     NotEnoughDataError
         When no zone is measured on the tuning days, or these are too few.
     """
-    seen = _seen(inputs, tuned)
-    if not seen.any():
-        raise NotEnoughDataError("no zone is measured on the tuning days")
-    runs = [select_runs(inputs, p.interval, evaluation.steps, spin_up=spin_up_seconds) for p in evaluation.predictions]
-    simple, errors = _SimpleModels(case, inputs, anatomy, seen, evaluation.steps), []
-    for r, p, own in zip(runs, evaluation.predictions, simple.regression(tuned, runs, spin_up_seconds), strict=True):
+    zones = _seen(inputs, tuned)
+    if not zones.any():
+        raise NotEnoughDataError(_UNSEEN)
+    runs = _runs_of(evaluation, inputs, spin_up_seconds)
+    simple = _SimpleModels(case, inputs, anatomy, zones, evaluation.steps)
+    return _errors(evaluation, inputs, zones, runs, simple.regression(tuned, runs, spin_up_seconds))
+
+
+def _runs_of(evaluation: Evaluation, inputs: Inputs, spin_up: float) -> list[Runs]:
+    """Choose the runs of the predictions of an evaluation."""
+    return [select_runs(inputs, p.interval, evaluation.steps, spin_up=spin_up) for p in evaluation.predictions]
+
+
+def _errors(
+    evaluation: Evaluation, inputs: Inputs, zones: np.ndarray, runs: Sequence[Runs], predicted: Sequence[FloatArray]
+) -> list[FloatArray]:
+    """Errors by prediction, zones that no sensor measures as they last were [K]."""
+    errors = []
+    for r, p, own in zip(runs, evaluation.predictions, predicted, strict=True):
         whole = inputs.held[r.starts].copy()
-        whole[:, seen] = own
+        whole[:, zones] = own
         errors.append(whole - p.measured[:, -1])
     return errors
 
@@ -167,8 +167,8 @@ def _seen(inputs: Inputs, tuned: Sequence[Interval]) -> np.ndarray:
     return np.asarray(np.isfinite(inputs.zone[rows]).any(axis=0))
 
 
-def _mae(predicted: Sequence[FloatArray], measured: Sequence[FloatArray]) -> float:
-    return spatial_metrics(np.concatenate(predicted) - np.concatenate(measured)).mae
+def _mae(errors: Sequence[FloatArray]) -> float:
+    return spatial_metrics(np.concatenate(errors)).mae
 
 
 class _SimpleModels:

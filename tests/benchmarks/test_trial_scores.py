@@ -31,7 +31,7 @@ def answer(verdict: str, first: str, group: tuple[str, ...] = (), mae: float = 0
         }
         for k, e in enumerate(effects)
     ]
-    how_far = [{"share_closed": 0.9}] if verdict in ("named", "group") else []
+    how_far = [{"share_closed": 0.9, "effects": [first]}] if verdict in ("named", "group") else []
     return {
         "verdict": verdict, "which": which, "set90": [first], "gap": {"mae": mae}, "how_far": how_far, "seconds": 20.0
     } | more  # fmt: skip
@@ -70,12 +70,24 @@ def test_rates_are_of_the_trials_that_count() -> None:
         "named right": (2, 3),
         "abstained": (0, 3),
         "wrong name, of all trials": (3, 10),
+        "a wrong one beside a right name": (0, 2),
         "outside called unexplained": (1, 2),
         "both of a pair in the first two": (1, 1),
         "90 % set covers": (1, 4),
     }
     for name, (hits, of) in wanted.items():
         assert (rates[name].hits, rates[name].of) == (hits, of), name
+
+
+def test_what_is_accepted_beside_a_right_name_has_to_be_there() -> None:
+    steps = [{"share_closed": 0.8, "effects": effects} for effects in (["solar_gain"], ["solar_gain", "sensor_bias"])]
+    told = answer("named", "solar_gain", how_far=steps)
+    alone, both = trial("single", ("solar_gain",), told), trial("pair", ("solar_gain", "sensor_bias"), told)
+    own = {**told, "which": [w for w in told["which"] if w["effect"] != "sensor_bias"]}  # what a building is known to have
+    assert alone.further_wrong and not both.further_wrong
+    assert not trial("single", ("solar_gain",), own).further_wrong
+    rate = score([alone, both])["rates"]["a wrong one beside a right name"]
+    assert (rate.hits, rate.of) == (1, 2)
 
 
 def test_what_leaves_no_gap_is_shown_apart() -> None:

@@ -42,6 +42,17 @@ class Seen(NamedTuple):
     switched: FloatArray
 
     @classmethod
+    def nothing(cls, drivers: InputProvider) -> Seen:
+        """Make courses of nothing.
+
+        Parameters
+        ----------
+        drivers : InputProvider
+            Of the case.
+        """
+        return cls(np.zeros_like(drivers.openings), np.zeros_like(drivers.switched))
+
+    @classmethod
     def of(cls, drivers: InputProvider) -> Seen:
         """Take what inputs of a case have.
 
@@ -76,7 +87,7 @@ def seen_at_first(case: Case, drivers: InputProvider, settings: ModelSettings) -
         How its model is built.
     """
     if len(drivers.zones) > _MOST_ZONES:
-        return Seen(np.zeros_like(drivers.openings), np.zeros_like(drivers.openings))
+        return Seen.nothing(drivers)
     # as long as nothing is fitted the air is what is drawn
     drawn = replace(settings, structure=replace(settings.structure, light_contents=False))
     network = drawn.network(case.building)
@@ -98,7 +109,7 @@ def seen_beyond(grid: SymbolicModel, theta: FloatArray, drivers: InputProvider, 
     inputs : Inputs
         Its telemetry, as the model takes it.
     """
-    seen = Seen(np.zeros_like(drivers.openings), np.zeros_like(drivers.openings))
+    seen = Seen.nothing(drivers)
     if len(drivers.zones) <= _MOST_ZONES:
         model = reduced_model(grid, [theta])
         rows, metered, needed = step_balance(model, theta, inputs)
