@@ -75,8 +75,9 @@ def _build_bias(builder: EffectBuilder) -> None:
 
 
 def _build_lag(builder: EffectBuilder) -> None:
-    lag, link = builder.parameter("sensor_lag"), ca.SX(_SENSOR / 60.0)
+    link = ca.SX(_SENSOR / 60.0)
     for room in builder.rooms:
+        lag = builder.parameter("sensor_lag", zone=room.name)
         node, heat = builder.graph.volumes("sensor", room.number), builder.anatomy.air_heat_capacity * room.volume
         builder.graph.capacity("sensor", lag * _SENSOR, node, heat)
         builder.air_to(room, link, int(node[0]), heat)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from pvlib import irradiance, solarposition
+from pvlib import atmosphere, irradiance, solarposition
 
 from thermal import Case, SymbolicModel, ThermalNetwork, build_network
 from thermal.effects.catalogue import CATALOGUE, chosen
@@ -81,7 +81,8 @@ def irradiances(b: Bench, azimuth: float, tilt: float = 90.0) -> tuple[float, fl
     )
     total = irradiance.get_total_irradiance(
         tilt, azimuth, zenith, place["azimuth"].to_numpy(), normal, normal * np.cos(np.radians(zenith)) + diffuse, diffuse,
-        albedo=0.2,
+        albedo=0.2, model="perez", dni_extra=irradiance.get_extra_radiation(middle.day_of_year.to_numpy()),
+        airmass=atmosphere.get_relative_airmass(zenith),
     )  # fmt: skip
     cosine = irradiance.aoi_projection(tilt, azimuth, zenith, place["azimuth"].to_numpy())
     return float(total["poa_direct"][0]), float(total["poa_diffuse"][0]), float(cosine[0])

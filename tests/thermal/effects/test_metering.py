@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from thermal import Case, Simulator, SymbolicModel, Telemetry, build_network, free_runs, replay_inputs, spin_up
 from thermal.effects.catalogue import chosen
+from thermal.effects.effect import ALIKE
 from thermal.inputs.provider import InputProvider, telemetry_inputs
 from thermal.inputs.signals import signal_values
 from thermal.model.modal_runs import ModalRuns
@@ -106,7 +107,7 @@ def test_a_lagging_sensor_is_a_first_order_filter(lively_case: CaseOf) -> None:
     # T_s' = (T - T_s) / τ over the model's own air temperature, at fine steps
     case, minutes = lively_case("table"), 10.0
     plant = Simulator(
-        case.building, {"sensor_lag": minutes}, step_seconds=5.0, scheme="tr_bdf2", effects=chosen(["sensor_lag"])
+        case.building, {"sensor_lag": minutes}, step_seconds=5.0, scheme="tr_bdf2", effects=chosen({"sensor_lag": ALIKE})
     )
     plant.reset(np.array([293.15, 292.15]), np.array([273.15, 280.15]))
     sensor, air = [], []
@@ -303,7 +304,7 @@ def test_a_station_elsewhere_reads_too_high_for_all_that_outdoor_air_touches(liv
 
 def test_the_modes_read_the_sensor(lively_case: CaseOf) -> None:
     # heated from rest, the first minute hardly shows in a sensor of eight minutes, and shows in the air
-    network = build_network(lively_case("table").building, effects=chosen(["sensor_lag"]))
+    network = build_network(lively_case("table").building, effects=chosen({"sensor_lag": ALIKE}))
     grid = SymbolicModel(network)
     boundary, heat, read = np.zeros((50, network.n_boundary, 1)), np.full((50, 2, 1), 500.0), []
     for minutes in (8.0, 0.0):

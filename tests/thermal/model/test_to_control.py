@@ -11,15 +11,17 @@ import pytest
 
 from thermal import ModelError, SymbolicModel, build_network, load_bundled_case, reduced_model
 from thermal.effects.catalogue import chosen
+from thermal.effects.effect import ALIKE
 from thermal.model.modal import ModalModel, modal_model
 from thermal.model.reduce import ReducedModel
 
 EFFECTS = {"solar_gain": {"solar_heat_gain_coefficient": 0.5}, "sensor_lag": {"sensor_lag": 5.0}}
+WHERE: dict[str, tuple[str, ...]] = {"solar_gain": (), "sensor_lag": ALIKE}
 
 
 @cache
 def reduced(effect: str = "") -> ReducedModel:
-    network = build_network(load_bundled_case().building, dx=1.5, effects=chosen([effect] if effect else []))
+    network = build_network(load_bundled_case().building, dx=1.5, effects=chosen({effect: WHERE[effect]} if effect else []))
     return reduced_model(SymbolicModel(network), [network.values(EFFECTS.get(effect, {}))], order=40)
 
 
