@@ -36,7 +36,7 @@ _STRENGTH: Mapping[str, tuple[str, tuple[str, ...], Callable[[float], float]]] =
     "ground_exchange": ("u_value_W_m2_K", ("ground_u_value",), _same),
     "roof_exchange": ("u_value_W_m2_K", ("roof_u_value",), _same),
     "neighbour": ("u_value_W_m2_K", ("neighbour_u_value",), _same),
-    "internal_gains": ("power_W_m2", ("internal_gain", "base_load", "equipment_gain"), _same),
+    "internal_gains": ("power_W_m2", ("internal_gain", "base_load", "equipment_gain", "scheduled_gain"), _same),
     "latent_load": ("power_W_m2", ("latent_load",), _same),
     "valve_leak": ("power_W_m2", ("valve_leak",), _same),
     "capacity_limit": ("lost_share", ("capacity_lost",), _same),

@@ -21,8 +21,9 @@ _USUAL_TRANSMITTANCE = 0.6
 #: Irradiance on a facade at which blinds may be drawn [W/m2]: knots of the interpolation in between.
 _DRAWN_AT = (100.0, 200.0, 300.0, 400.0)
 
-#: Heat of a room's equipment that nobody meters: what is always on [W/m2], and what is switched on at times [W].
-EQUIPMENT, SWITCHED_HEAT = "equipment_gain", "switched_heat"
+#: Heat in a room that nobody meters: of equipment that is always on and in the hours of people [W/m2], and of what is
+#: switched on at times [W].
+EQUIPMENT, IN_HOURS, SWITCHED_HEAT = "equipment_gain", "scheduled_gain", "switched_heat"
 
 PRESENCE = Signal("presence", "1", attrgetter("occupancy"), ("occupancy",))
 AT_HOME = Signal("presence at home", "1", attrgetter("at_home"), ("at_home",))
@@ -107,10 +108,16 @@ def _build_courses(builder: EffectBuilder) -> None:
 
 
 def _build_equipment(builder: EffectBuilder) -> None:
-    """Let some rooms have heat that is always on, and heat that is switched, each."""
+    """Let some rooms have heat that is always on, heat in the hours of people, and heat that is switched, each."""
     for room in builder.rooms:
         _give_half_to_air(builder, room, builder.parameter(EQUIPMENT, zone=room.name), CONSTANT, room.floor_area)
+    _build_in_hours(builder)
     _build_switched(builder)
+
+
+def _build_in_hours(builder: EffectBuilder) -> None:
+    for room in builder.rooms:
+        _give_half_to_air(builder, room, builder.parameter(IN_HOURS, zone=room.name), PRESENCE, room.floor_area)
 
 
 def _build_switched(builder: EffectBuilder) -> None:
@@ -162,7 +169,7 @@ INTERNAL_GAINS = described("internal_gains", _build_people)
 
 
 def has_people(building: Building, effects: Mapping[str, Sequence[str]]) -> bool:
-    """Whether a model has the heat of people, and not only equipment of some zones.
+    """Whether a model has the heat of people, and not only heat of some zones, whatever gives it.
 
     Parameters
     ----------
@@ -175,6 +182,7 @@ def has_people(building: Building, effects: Mapping[str, Sequence[str]]) -> bool
     return zones is not None and len(zones) in (0, len(building.zone_names))
 
 
-#: What is switched in some rooms alone, for a screening.
+#: What some rooms have in the hours of people, and what is switched there, alone: for a screening.
+SCHEDULED = replace(INTERNAL_GAINS, build=_build_in_hours)
 SWITCHED = replace(INTERNAL_GAINS, build=_build_switched)
 LATENT_LOAD = described("latent_load", _build_latent)

@@ -1,11 +1,11 @@
-"""Equipment of single zones that nobody meters, as a form of the heat of people, light and equipment."""
+"""Heat of single zones that nobody meters, as a form of the heat of people, light and equipment."""
 
 from collections.abc import Collection, Sequence
 
 from calibration.diagnosis.screen.generic import ZONE_HEAT
 from thermal.effects.catalogue import CATALOGUE
 from thermal.effects.effect import Chosen
-from thermal.effects.gains import EQUIPMENT, INTERNAL_GAINS, SWITCHED
+from thermal.effects.gains import EQUIPMENT, INTERNAL_GAINS, SCHEDULED, SWITCHED
 from thermal.inputs.provider import InputProvider
 from thermal.parameters import Parameter
 
@@ -36,7 +36,7 @@ def always_on(parameters: Sequence[Parameter], lacking: Collection[str]) -> dict
 
 
 def at_times(drivers: InputProvider, lacking: Collection[str], here: Collection[str]) -> list[Chosen]:
-    """Heat that is seen to be switched, in the zones where it is.
+    """Heat of single zones in the hours of people, and heat that is seen to be switched, in the zones where it is.
 
     Parameters
     ----------
@@ -47,6 +47,9 @@ def at_times(drivers: InputProvider, lacking: Collection[str], here: Collection[
     here : collection of str
         Zones to which a search is confined; empty where it is not.
     """
-    seen = (zone for zone, course in zip(drivers.zones, drivers.switched.T, strict=True) if course.any())
-    where = tuple(zone for zone in seen if not here or zone in here)
-    return [Chosen(SWITCHED, where)] if where and EQUIPPED in lacking and len(drivers.zones) > 1 else []
+    if EQUIPPED not in lacking or len(drivers.zones) < 2:
+        return []
+    where = [zone for zone in drivers.zones if not here or zone in here]
+    seen = [zone for zone, course in zip(drivers.zones, drivers.switched.T, strict=True) if course.any()]
+    both = (SCHEDULED, tuple(where)), (SWITCHED, tuple(zone for zone in where if zone in seen))
+    return [Chosen(effect, zones) for effect, zones in both if zones]

@@ -70,9 +70,13 @@ def test_rooms_that_are_named_have_hours_of_their_own(building: Building) -> Non
 
 def test_some_rooms_that_are_named_have_equipment(building: Building) -> None:
     network = build_network(building, effects=chosen({"internal_gains": ["A"]}))
-    assert [p.name for p in network.parameters if p.effect] == ["equipment_gain@A", "switched_heat@A"]
+    assert [p.name for p in network.parameters if p.effect] == [
+        "equipment_gain@A", "scheduled_gain@A", "switched_heat@A",
+    ]  # fmt: skip
     heat = heat_by_zone(network, "constant", **{"equipment_gain@A": 4.0})
     assert heat == pytest.approx({"A": 4.0 * FLOOR["A"], "B": 0.0}, rel=1e-9)
+    heat = heat_by_zone(network, "presence", **{"scheduled_gain@A": 6.0})
+    assert heat == pytest.approx({"A": 6.0 * FLOOR["A"], "B": 0.0}, rel=1e-9)
     heat = heat_by_zone(network, "heat seen on in A", **{"switched_heat@A": 900.0})
     assert heat == pytest.approx({"A": 900.0, "B": 0.0}, rel=1e-9)
 
