@@ -223,6 +223,7 @@ class Diagnosis(Result):
             },
             **answer_entries(self.verdict, self.steps, self.rounds, self.faults, self.floor),
             **({} if self.left_over is None else {"left_over": plain(self.left_over)}),
+            "turned": self.settings.structure.turned,
             "correction": None if self.correction is None else self.correction.to_dict(),
             "prediction": {"rungs": plain(self.rungs), "held_out_mae": self.predicts, "carried": plain(carried)},
             "intervals": {

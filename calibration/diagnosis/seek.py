@@ -21,6 +21,7 @@ from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.diagnosis.refit.how_far import Step, how_far
 from calibration.diagnosis.refit.refit import HeldOut, elsewhere, held_out
 from calibration.diagnosis.refit.search import Round, search
+from calibration.diagnosis.refit.turned import turn
 from calibration.diagnosis.screen.regular import Regular, regular
 from calibration.evaluation.intervals import Interval
 from calibration.evaluation.settings import ModelSettings
@@ -216,6 +217,7 @@ def _seek(drawn: ModelComparison, known: Sequence[str], ruled_out: Sequence[str]
     models, baseline, errors, last_third = begun
     testable = [e for e in CATALOGUE if e not in untestable]
     rounds = search(models, baseline, errors, testable, whole.part(0.5))
+    models, rounds = stage("turned building", lambda: turn(models, rounds, testable, whole.part(0.1, "north")))
     models, rounds = stage(
         "values by zone", lambda: challenge(models, rounds, testable, whole.part(0.3, "values by zone"))
     )

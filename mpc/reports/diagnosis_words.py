@@ -55,6 +55,12 @@ def diagnosis_verdict(result: Diagnosis) -> str:
             " No irradiance is measured: how bright a day was is estimated from the range of the outdoor temperature, "
             "so that the sun's size is rough."
         )
+    if turned := result.settings.structure.turned:
+        side = "clockwise" if turned > 0.0 else "counterclockwise"
+        text += (
+            f" The sun comes as if the building stood {abs(turned):.0f}° {side} of how it is drawn: check where north "
+            "is (`orientation`, `azimuth`)."
+        )
     if result.settings.structure.light_contents:
         times = significant(result.final.values["air_capacity_multiplier"])
         text += (

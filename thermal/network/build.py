@@ -85,6 +85,19 @@ class Blueprint:
         return graph.finish(observation, heating, graph.anatomy.airflows, self.spacing, self.floor_shapes)
 
 
+def _turned(building: Building, angle: float) -> Building:
+    """Turn a building clockwise by an angle [deg]: its plans, or the outer faces of its zone table."""
+    if not angle:
+        return building
+    if not isinstance(table := building.geometry, ZoneTable):
+        return replace(building, orientation=(building.orientation + angle) % 360.0)
+    surfaces = (
+        s if s.azimuth is None else s.model_copy(update={"azimuth": (s.azimuth + angle) % 360.0})
+        for s in table.surfaces
+    )
+    return replace(building, geometry=replace(table, surfaces=tuple(surfaces)))
+
+
 def _remember(
     graph: GraphBuilder, building: Building, plans: FloorPlans, zones: Mapping[str, Zone], areas: Mapping[str, float]
 ) -> None:
@@ -231,6 +244,7 @@ def _drawn(
     structure: Structure,
 ) -> Blueprint:
     """Build the baseline as it is drawn."""
+    building = _turned(building, structure.turned)
     boundaries = ("outdoor", *building.measured_boundaries)
     graph, plans = GraphBuilder(building.zone_names, boundaries, scopes or {}, structure), building.geometry
     graph.quality = building.geometry_quality

@@ -110,6 +110,8 @@ class Structure:
     light_contents : bool
         A multiplier of the air's heat capacity, for what follows the air within minutes, of a model that is not lumped,
         which has one a zone.
+    turned : float
+        By how much the building stands clockwise of its drawing, -180 to 180 [deg], as its sun may tell.
     emitter : {"air", "radiator", "floor"}
         What plain heaters of which a case does not say it give their heat by: the air alone, surfaces too, or floors
         too, each zone's by a share that is fitted.
@@ -136,6 +138,7 @@ class Structure:
     wind_films: bool = False
     natural_films: bool = False
     light_contents: bool = False
+    turned: float = 0.0
     emitter: Unknown = "air"
 
     @property
@@ -148,6 +151,8 @@ class Structure:
         for name in ("furniture", "radiant", "lumped", "sun", "recurring", *films, "light_contents"):
             if not isinstance(getattr(self, name), bool):
                 raise ModelError(f"structure.{name}: expected true or false, got {getattr(self, name)!r}")
+        if isinstance(self.turned, bool) or not isinstance(self.turned, int | float) or not abs(self.turned) <= 180.0:
+            raise ModelError(f"structure.turned: expected -180 to 180 deg, got {self.turned!r}")
         if self.emitter not in get_args(Unknown):
             raise ModelError(f"structure.emitter: expected one of {get_args(Unknown)}, got {self.emitter!r}")
         for name, least in (("slab_nodes", 0), ("wall_nodes", 1)):

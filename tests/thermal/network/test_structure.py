@@ -289,6 +289,18 @@ def test_settings_come_back_from_their_file(tmp_path: Path, structure: Structure
     assert ("radiant" in networks[0].kind) == structure.radiant
 
 
+@pytest.mark.parametrize("kind", BUILDINGS)
+def test_a_building_that_is_turned_looks_elsewhere_and_is_else_the_same(kind: str) -> None:
+    there, turned = (build_network(BUILDINGS[kind], structure=Structure(turned=angle)) for angle in (0.0, -30.0))
+    assert [(p.azimuth + 30.0) % 360.0 for p in turned.anatomy.panes] == [p.azimuth for p in there.anatomy.panes]
+    assert {round((a + 30.0) % 360.0, 9): v for (_, a), v in turned.anatomy.facades.items()} == {
+        a: v for (_, a), v in there.anatomy.facades.items()
+    }
+    walls = [[f.outlook.azimuth for f in n.anatomy.outer if f.outlook.tilt == 90.0] for n in (turned, there)]
+    assert [(a + 30.0) % 360.0 for a in walls[0]] == walls[1] and walls[1]
+    assert turned.parameters == there.parameters
+
+
 def test_settings_without_structure_are_those_of_the_baseline(tmp_path: Path) -> None:
     path = tmp_path / "calibration.json"
     path.write_text(json.dumps({"settings": {"dx": 0.5}}), encoding="utf-8")
@@ -302,6 +314,7 @@ def test_settings_without_structure_are_those_of_the_baseline(tmp_path: Path) ->
         ({"structure": {"furnitur": True}}, r"settings\.structure: expected a mapping .*furnitur"),
         ({"structure": {"wall_nodes": 0}}, r"settings\.structure\.wall_nodes: expected a whole number from 1 to 100"),
         ({"structure": {"radiant": "no"}}, r"settings\.structure\.radiant: expected true or false, got 'no'"),
+        ({"structure": {"turned": 270}}, r"settings\.structure\.turned: expected -180 to 180 deg, got 270"),
         ({"scopes": ["window_u_value"]}, r"settings\.scopes: expected a mapping to global, facade, zone"),
         ({"scopes": {"window_u_value": "side"}}, r"settings\.scopes: expected .*side"),
     ],
