@@ -24,7 +24,7 @@ from mpc.scenario.weather import Weather
 from mpc.studies.optimal_control import MODEL_STEP
 from thermal.case.building import Building
 from thermal.effects.catalogue import chosen
-from thermal.effects.gains import has_people
+from thermal.effects.gains import INTERNAL_GAINS, has_people
 from thermal.model.reduce import ReducedModel
 from thermal.system.sizing import size_system
 from thermal.system.system import HvacSystem
@@ -225,6 +225,9 @@ def make_study(
     if has_people(building, built.effects):
         gains = InternalGains(sensible=0.0, equipment=0.0, lights=0.0)
         notes += ("heat of people and equipment is that of the calibrated effect, none is added",)
+    elif rooms := built.effects.get(INTERNAL_GAINS.id):
+        own = ", ".join(rooms)
+        notes += (f"heat of the calibrated effect in {own} is there beside people and equipment of all rooms",)
     scenario = given.scenario(ready, longer, _prolonged(weather, grid, longer), gains)
     truth = model = reduced(built, ready, given.parameters, given.order)
     if given.controller_parameters is not None:

@@ -31,7 +31,8 @@ AT_HOME = Signal("presence at home", "1", attrgetter("at_home"), ("at_home",))
 
 def _through(inputs: InputProvider, azimuth: float, tilt: float, threshold: float = -1.0) -> FloatArray:
     """Sun through glass while more than a threshold falls on it; by default always."""
-    return np.where(on_plane(inputs, azimuth, tilt) > threshold, inputs.sun.through_glass(azimuth, tilt), 0.0)
+    light = inputs.sun.through_glass(azimuth, tilt)
+    return light if threshold < 0.0 else np.where(on_plane(inputs, azimuth, tilt) > threshold, light, 0.0)
 
 
 def _of_sun(name: str, of: Callable[..., FloatArray], azimuth: float, tilt: float, **given: float) -> Signal:

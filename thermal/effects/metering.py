@@ -79,7 +79,7 @@ def _build_lag(builder: EffectBuilder) -> None:
     for room in builder.rooms:
         lag = builder.parameter("sensor_lag", zone=room.name)
         node, heat = builder.graph.volumes("sensor", room.number), builder.anatomy.air_heat_capacity * room.volume
-        builder.graph.capacity("sensor", lag * _SENSOR, node, heat)
+        builder.graph.capacity(f"sensor {room.name}", lag * _SENSOR, node, heat)
         builder.air_to(room, link, int(node[0]), heat)
         builder.graph.reading(room.number, int(node[0]))
 

@@ -1,7 +1,7 @@
 """Sun's place and irradiance on tilted planes, by pvlib, at the middle of each step."""
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 import pandas as pd
@@ -68,6 +68,13 @@ class Sun:
     horizontal: FloatArray
     above: FloatArray
 
+    @cached_property
+    def airmass(self) -> FloatArray:
+        """Way of the beam through the air over that from the zenith, shape (n_time,) [-]; NaN while the sun is set."""
+        from pvlib.atmosphere import get_relative_airmass
+
+        return np.asarray(get_relative_airmass(90.0 - self.altitude), dtype=float)
+
     def cosine(self, azimuth: float, tilt: float) -> FloatArray:
         """Cosine of the angle of incidence on a plane, negative behind it [-].
 
@@ -84,20 +91,22 @@ class Sun:
         """Beam and diffuse irradiance on a plane: sky that is brighter about the sun and at the horizon, and ground.
 
         The sky is that of Perez et al. (1990), doi:10.1016/0038-092X(90)90055-H, as in EnergyPlus: on a clear day a
-        facade in the sun gets twice the diffuse light of an isotropic sky. Where the sun is down there is none.
+        facade in the sun gets twice the diffuse light of an isotropic sky. Where the sun counts as set it is isotropic
+        (Liu and Jordan 1963): light there is of a clock that is wrong, and would be thousands of W/m2 about the sun.
 
         Parameters
         ----------
         azimuth, tilt : float
             Of the plane's normal [deg].
         """
-        from pvlib import atmosphere, irradiance
+        from pvlib.irradiance import perez
 
-        beam, zenith = self.normal * np.maximum(self.cosine(azimuth, tilt), 0.0), 90.0 - self.altitude
-        mass = atmosphere.get_relative_airmass(zenith)
-        told = self.diffuse, self.normal, self.above, zenith, self.azimuth, mass
-        sky = np.nan_to_num(np.asarray(irradiance.perez(tilt, azimuth, *told), dtype=float))
-        ground = GROUND_REFLECTANCE * self.horizontal * (1.0 - np.cos(np.radians(tilt))) / 2.0
+        beam = self.normal * np.maximum(self.cosine(azimuth, tilt), 0.0)
+        told = self.diffuse, self.normal, self.above, 90.0 - self.altitude, self.azimuth, self.airmass
+        bright = np.asarray(perez(tilt, azimuth, *told), dtype=float)
+        up = np.cos(np.radians(tilt))
+        sky = np.where(self.altitude > _LOWEST, bright, self.diffuse * (1.0 + up) / 2.0)
+        ground = GROUND_REFLECTANCE * self.horizontal * (1.0 - up) / 2.0
         return beam, np.asarray(sky + ground)
 
     def through_glass(self, azimuth: float, tilt: float) -> FloatArray:

@@ -22,6 +22,12 @@ _SUN = ("solar_gain", "solar_opaque")
 #: Steps of angles [deg]: half of what tells a facade from the next, then a few degrees.
 _STEPS = (45.0, 12.0)
 
+#: Angle up to which a building stands as it is drawn [deg]: shade on one side looks like a few degrees.
+_LEAST = 5.0
+
+#: Curvature of the evidence over a step up to which it is flat, as fits are not exact [-].
+_FLAT = 0.1
+
 #: Evaluations of a fit at another angle, from the estimate at the one before.
 _EVALUATIONS = 6
 
@@ -61,17 +67,20 @@ def turn(
     if not (sunlit or hidden) or is_large(models.case.building.zone_names):
         return models, tuple(rounds)
     with suppress(*_FAILURES):
-        drawn = final if sunlit else models.fit({**final.effects, _SUN[0]: ()}, [final.values])
-        angle, fit, price = _climbed(models, 0.0, drawn, _STEPS[0])
+        drawn = _fit(models, final) if sunlit else models.fit({**final.effects, _SUN[0]: ()}, [final.values])
         least = max(final.evidence, drawn.evidence) + ACCEPTED
+        angle, fit, price = _climbed(models, 0.0, drawn, _STEPS[0])
         if fit.evidence - price > least:
             angle, fit, price = _climbed(models, angle, fit, _STEPS[1])
         own = _turned(models, angle)
         grown, error = growth(rounds[-1].after_held_out, held_out(own, fit))
-        if fit.evidence - price > least and grown <= NO_WORSE + CHANCE * error:
+        if abs(angle) > _LEAST and fit.evidence - price > least and grown <= NO_WORSE + CHANCE * error:
             known = rounds[0].before.effects
             baseline = own.fit(known, [rounds[0].before.values])
-            return own, search(own, baseline, held_out(own, baseline), candidates, progress)
+            again = search(own, baseline, held_out(own, baseline), candidates, progress)
+            # a search may stop at less than what was turned, and is no better than the drawing then
+            if any(effect in again[-1].after.effects for effect in _SUN) and again[-1].after.evidence - price > least:
+                return own, again
     return models, tuple(rounds)
 
 
@@ -89,9 +98,11 @@ def _climbed(models: ModelComparison, angle: float, fit: Fit, step: float) -> tu
             break
         angle = best
     low, peak, high = (fits[tried].evidence for tried in (sides[0], angle, sides[1]))
-    bent = 2.0 * peak - low - high
-    top = _wrapped(angle + 0.5 * step * (high - low) / bent)
-    return top, _fit(_turned(models, top), fits[angle]), float(np.log(360.0 / step * np.sqrt(bent / (2.0 * np.pi))))
+    if (bent := 2.0 * peak - low - high) > _FLAT:
+        top = _wrapped(angle + 0.5 * step * (high - low) / bent)
+        fits[top] = _fit(_turned(models, top), fits[angle])
+        angle = max((angle, top), key=lambda tried: fits[tried].evidence)
+    return angle, fits[angle], max(0.0, float(np.log(360.0 / step * np.sqrt(max(bent, _FLAT) / (2.0 * np.pi)))))
 
 
 def _wrapped(angle: float) -> float:

@@ -302,6 +302,22 @@ def test_a_station_elsewhere_reads_too_high_for_all_that_outdoor_air_touches(liv
     assert np.abs(daily.of(drivers)[inner] - (drivers.outdoor - 280.0)[inner]).max() < 0.05
 
 
+def test_each_sensor_lags_by_its_own_time(lively_case: CaseOf) -> None:
+    case = lively_case("table")
+    network = build_network(case.building, effects=chosen(["sensor_lag"]))
+    names = [p.name for p in network.parameters if p.effect]
+    assert names == [f"sensor_lag@{zone}" for zone in case.building.zone_names] and len(names) == 2
+    grid, inputs = SymbolicModel(network), replay_inputs(case, network)
+    runs = []
+    for lag in ({}, {names[0]: 9.0}, {names[1]: 9.0}):
+        matrices = grid.matrices(network.values(dict.fromkeys(names, 0.0) | lag))
+        states, _ = spin_up(matrices, inputs, 0, np.array([220]))
+        runs.append(free_runs(matrices, inputs, np.array([220]), 24, states)[0].reshape(-1, 2))
+    for late in (0, 1):
+        moved = np.abs(runs[late + 1] - runs[0]).max(axis=0)
+        assert moved[late] > 0.05 and moved[1 - late] < 1e-3 * moved[late]
+
+
 def test_the_modes_read_the_sensor(lively_case: CaseOf) -> None:
     # heated from rest, the first minute hardly shows in a sensor of eight minutes, and shows in the air
     network = build_network(lively_case("table").building, effects=chosen({"sensor_lag": ALIKE}))
