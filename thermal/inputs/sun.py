@@ -103,7 +103,7 @@ class Sun:
 
         beam = self.normal * np.maximum(self.cosine(azimuth, tilt), 0.0)
         told = self.diffuse, self.normal, self.above, 90.0 - self.altitude, self.azimuth, self.airmass
-        bright = np.asarray(perez(tilt, azimuth, *told), dtype=float)
+        bright = np.nan_to_num(np.asarray(perez(tilt, azimuth, *told), dtype=float))  # without light it is 0 / 0
         up = np.cos(np.radians(tilt))
         sky = np.where(self.altitude > _LOWEST, bright, self.diffuse * (1.0 + up) / 2.0)
         ground = GROUND_REFLECTANCE * self.horizontal * (1.0 - up) / 2.0
