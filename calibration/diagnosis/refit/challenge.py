@@ -8,7 +8,6 @@ hide them: then sensors seem to lag once it is found.
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +17,6 @@ from calibration.diagnosis.refit.comparison import Effects, Fit, ModelComparison
 from calibration.diagnosis.refit.refit import ACCEPTED, held_out
 from calibration.diagnosis.refit.search import Round, search
 from calibration.errors import CalibrationError
-from calibration.evaluation.settings import ModelSettings
 from calibration.fit.fitted_case import is_large
 from calibration.fit.ladder import by_zone
 from calibration.fit.undrawn import BY_EVIDENCE, UNDRAWN, is_another
@@ -98,18 +96,11 @@ def _others(models: ModelComparison, drawn: Fit) -> Iterator[ModelComparison]:
     for names in by_zone(models.case.building) if len(models.case.building.zone_names) > 1 else ():
         scopes: dict[str, Scope] = {name: "zone" for name in names if name in told and name not in settings.scopes}
         if scopes:
-            yield _in(models, replace(settings, scopes={**settings.scopes, **scopes}))
+            yield models.built_as(replace(settings, scopes={**settings.scopes, **scopes}))
     for name in BY_EVIDENCE:
-        other = _in(models, replace(settings, structure=UNDRAWN[name].put(settings.structure)))
+        other = models.built_as(replace(settings, structure=UNDRAWN[name].put(settings.structure)))
         if is_another(other.build(drawn.effects).network, drawn.built.network):
             yield other
-
-
-def _in(models: ModelComparison, settings: ModelSettings) -> ModelComparison:
-    """Give the case in another structure, on the same days."""
-    other = replace(models, settings=settings, tune=models.tuned, hold_out=models.judged)
-    other.drivers = copy(models.drivers)  # a search may see other windows open about it
-    return other
 
 
 def _rivals(rounds: Sequence[Round], known: Effects) -> Iterator[tuple[Effects, float]]:

@@ -1,6 +1,7 @@
 """Comparison of models of one case: with some effects of the catalogue each, fitted to the same telemetry."""
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -250,6 +251,18 @@ class ModelComparison:
 
     def __post_init__(self) -> None:
         self.tuned, self.judged = intervals.default_intervals(self.case, self.tune, self.hold_out)
+
+    def built_as(self, settings: ModelSettings) -> "ModelComparison":
+        """Give the same case, days and inputs with a baseline that is built otherwise.
+
+        Parameters
+        ----------
+        settings : ModelSettings
+            Of that baseline.
+        """
+        other = replace(self, settings=settings, tune=self.tuned, hold_out=self.judged)
+        other.drivers = copy(self.drivers)  # a search may see other windows open about it
+        return other
 
     @property
     def calibration(self) -> CalibrationSettings:

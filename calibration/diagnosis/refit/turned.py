@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from contextlib import suppress
-from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -112,10 +111,7 @@ def _wrapped(angle: float) -> float:
 
 def _turned(models: ModelComparison, angle: float) -> ModelComparison:
     """Give the case a building that is turned, on the same days."""
-    settings = replace(models.settings, structure=replace(models.settings.structure, turned=angle))
-    other = replace(models, settings=settings, tune=models.tuned, hold_out=models.judged)
-    other.drivers = copy(models.drivers)
-    return other
+    return models.built_as(replace(models.settings, structure=replace(models.settings.structure, turned=angle)))
 
 
 def _fit(models: ModelComparison, known: Fit) -> Fit:
