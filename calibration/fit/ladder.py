@@ -227,8 +227,8 @@ def climb_from(
         if (found := looked[best].fit) is not None:
             base, fitted = found.settings, found.best
     people = ladder.people(base, fitted, beside, (1.0 - advance) * looked[best].left.mae)
-    lumped = Structure(lumped=True, sun=source.gives("sun"), turned=base.structure.turned)
-    free = ladder.lumped(lumped, looked[best].left.mae)
+    without = Structure(lumped=True, sun=source.gives("sun"), turned=base.structure.turned)
+    free = ladder.lumped(without, looked[best].left.mae)
     drawn = min(each.left.mae for each in free) >= _WRONG * looked[best].left.mae
     least = looked[best].left.mae
     for name, part in UNDRAWN.items() if plain and drawn else ():
@@ -245,10 +245,10 @@ def climb_from(
     if scopes and plain and drawn and not base.scopes and len(fitted.model.network.zones) > 1:
         looked.append(ladder.fitted("zoned", replace(base, scopes={**base.scopes, **scopes}), fitted))
     looked += people + free
-    found = free[_best(free, ADVANCE)].fit
-    if found is not None and days_of(given.tuned) >= _WEEK:
-        recurring = replace(found.settings, structure=replace(found.settings.structure, recurring=True))
-        begun["recurring"] = recurring, found.best
+    lumped = free[_best(free, ADVANCE)].fit
+    if lumped is not None and days_of(given.tuned) >= _WEEK:
+        recurring = replace(lumped.settings, structure=replace(lumped.settings.structure, recurring=True))
+        begun["recurring"] = recurring, lumped.best
         looked.append(ladder.look("recurring", _begun(given, *begun["recurring"])))
     best = _best(looked, advance, lumped_advance)
     if looked[best].name in begun:

@@ -16,6 +16,9 @@ from thermal.errors import ModelError
 from thermal.model.matrices import SymbolicModel
 from thermal.model.reduce import ReducedModel, reduced_model
 
+#: What a fit from a start may end in; what is known without it stands then.
+FAILURES = (ArithmeticError, np.linalg.LinAlgError, CalibrationError, ModelError)
+
 #: What is said of a start that Ctrl-C ended.
 STOPPED = "stopped by Ctrl-C"
 
@@ -123,7 +126,7 @@ def solve_starts(
                     continue
                 z = explored
             found = estimate(problem, z, part, first if number == 0 else None, tuner, close and number == 0)
-        except (ArithmeticError, np.linalg.LinAlgError, CalibrationError, ModelError) as error:
+        except FAILURES as error:
             failures.append(f"start {number + 1}: {error}")
             continue
         except KeyboardInterrupt:

@@ -10,18 +10,15 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
-import numpy as np
-
 from calibration.diagnosis.decide.verdict import judge
 from calibration.diagnosis.refit.comparison import Effects, Fit, ModelComparison
 from calibration.diagnosis.refit.refit import ACCEPTED, held_out
 from calibration.diagnosis.refit.search import Round, search
-from calibration.errors import CalibrationError
 from calibration.fit.fitted_case import is_large
 from calibration.fit.ladder import by_zone
+from calibration.fit.starts import FAILURES
 from calibration.fit.undrawn import BY_EVIDENCE, UNDRAWN, is_another
 from calibration.progress import Progress
-from thermal.errors import ModelError
 from thermal.parameters import Scope
 
 #: Effects that give a zone a part of its metered heat more or less, as another mass of the zone seems to, or later.
@@ -29,9 +26,6 @@ _LIKE_MASSES = frozenset({"flow_gain", "duct_loss", "capacity_limit", "sensor_la
 
 #: What says itself that masses are not as drawn.
 _MASS = "hidden_mass"
-
-#: What a fit or a search may end in; what was found stands then.
-_FAILURES = (ArithmeticError, np.linalg.LinAlgError, CalibrationError, ModelError)
 
 
 def challenge(
@@ -71,7 +65,7 @@ def challenge(
         fits = [(own, _fit(own, effects, final, least)) for own in others]
         better = [(own, fit) for own, fit in fits if fit is not None and fit.evidence >= least]
         for own, other in sorted(better, key=lambda found: -found[1].evidence):
-            with suppress(*_FAILURES):
+            with suppress(*FAILURES):
                 baseline = other if effects == known else own.fit(known, [_values(final, known)])
                 again = search(own, baseline, held_out(own, baseline), candidates, progress)
                 # of several effects a search may find the first alone, and what it stops at is no better then
@@ -86,7 +80,7 @@ def _fit(models: ModelComparison, effects: Effects, final: Fit, least: float) ->
     """Fit effects from where they were found, while they may reach an evidence; None where that fails."""
     try:
         return models.fit(effects, [_values(final, effects)], least=least)
-    except _FAILURES:
+    except FAILURES:
         return None
 
 

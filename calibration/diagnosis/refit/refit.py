@@ -14,13 +14,12 @@ from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.diagnosis.screen.gains import MATTERS, Gain, choice_of
 from calibration.diagnosis.screen.screen import Screening
 from calibration.diagnosis.screen.seen import WINDOWS, seen_beyond
-from calibration.errors import CalibrationError
 from calibration.evaluation.n_step import Predictions
 from calibration.fit.problem import Problem
+from calibration.fit.starts import FAILURES
 from thermal._types import FloatArray, IntArray
 from thermal.effects.catalogue import CATALOGUE
 from thermal.effects.effect import zones_of
-from thermal.errors import ModelError
 
 #: Evaluations of a fit from one start.
 _EVALUATIONS = 10
@@ -225,7 +224,7 @@ class Work:
         try:
             effects = {**self.fit.effects, **{g.effect: g.zones for g in gains}}
             anew = self.models.fit(effects, [start], evaluations=_EVALUATIONS)
-        except (ArithmeticError, np.linalg.LinAlgError, CalibrationError, ModelError):
+        except FAILURES:
             return None
         return self.weighed(gains, anew)
 

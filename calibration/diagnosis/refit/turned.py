@@ -10,10 +10,9 @@ from calibration.diagnosis.decide.verdict import judge
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.diagnosis.refit.refit import ACCEPTED, CHANCE, NO_WORSE, growth, held_out
 from calibration.diagnosis.refit.search import Round, search
-from calibration.errors import CalibrationError
 from calibration.fit.fitted_case import is_large
+from calibration.fit.starts import FAILURES
 from calibration.progress import Progress
-from thermal.errors import ModelError
 
 #: Effects that come from a side.
 _SUN = ("solar_gain", "solar_opaque")
@@ -29,9 +28,6 @@ _FLAT = 0.1
 
 #: Evaluations of a fit at another angle, from the estimate at the one before.
 _EVALUATIONS = 6
-
-#: What a fit may end in; the drawing's north stands then.
-_FAILURES = (ArithmeticError, np.linalg.LinAlgError, CalibrationError, ModelError)
 
 
 def turn(
@@ -65,15 +61,17 @@ def turn(
     sunlit = any(effect in final.effects for effect in _SUN)
     if not (sunlit or hidden) or is_large(models.case.building.zone_names):
         return models, tuple(rounds)
-    with suppress(*_FAILURES):
+    with suppress(*FAILURES):
         drawn = _fit(models, final) if sunlit else models.fit({**final.effects, _SUN[0]: ()}, [final.values])
         least = max(final.evidence, drawn.evidence) + ACCEPTED
         angle, fit, price = _climbed(models, 0.0, drawn, _STEPS[0])
         if fit.evidence - price > least:
             angle, fit, price = _climbed(models, angle, fit, _STEPS[1])
+        if abs(angle) <= _LEAST or fit.evidence - price <= least:
+            return models, tuple(rounds)
         own = _turned(models, angle)
         grown, error = growth(rounds[-1].after_held_out, held_out(own, fit))
-        if abs(angle) > _LEAST and fit.evidence - price > least and grown <= NO_WORSE + CHANCE * error:
+        if grown <= NO_WORSE + CHANCE * error:
             known = rounds[0].before.effects
             baseline = own.fit(known, [rounds[0].before.values])
             again = search(own, baseline, held_out(own, baseline), candidates, progress)
