@@ -11,6 +11,7 @@ from calibration.grey_box.fit import GreyBoxData, fit_grey_box, follow
 from calibration.grey_box.judge import LeadError, judge
 from calibration.grey_box.network import GreyBox
 from mpc.errors import PlantError
+from mpc.identify.air_handler import find_air_handler, told_by_whole_steps, with_powers
 from mpc.identify.curves import EMITTER
 from mpc.identify.machines import Machine, as_heated, check_terminals, pairs_as_heated
 from mpc.identify.maps import led_heat, map_machines
@@ -23,6 +24,7 @@ from mpc.identify.water import SupplyWater
 from mpc.identify.water_regression import WaterCourse, find_water
 from thermal._types import FloatArray
 from thermal.case.points import ZONE_TEMPERATURE
+from thermal.units import from_si
 
 Progress = Callable[[str, int, int], None]
 
@@ -83,7 +85,9 @@ def identify(telemetry: PlantTelemetry, machines: Sequence[Machine], progress: P
     machines = [_measured(machine, telemetry) for machine in machines]
     if telemetry.site.capacity:
         check_terminals(machines, telemetry.site.areas)
-    data = _data(telemetry, machines)
+    above = _above(telemetry, machines)
+    handler, machines, lost = find_air_handler(telemetry, machines, above)
+    data = _data(telemetry, machines, lost)
     suns = tuple(telemetry.suns)
     serves = {machine.name: machine.serves for machine in machines}
     metered = tuple(bool(machine.meter) for machine in machines)
@@ -98,8 +102,10 @@ def identify(telemetry: PlantTelemetry, machines: Sequence[Machine], progress: P
     loads = _loads(telemetry, machines, data, box)
     signals = np.column_stack([machine.signal(telemetry) for machine in machines])
     bought = {name: telemetry.column(name) for name in CARRIERS if name in telemetry.frame}
+    if handler is not None:
+        handler, bought = with_powers(handler, telemetry, machines, bought)
+        above = told_by_whole_steps(handler, telemetry, machines, above)
     own = [telemetry.column(m.power) if m.power and m.meter else None for m in machines]
-    above = _above(telemetry, machines)
     per_day = round(86_400.0 / telemetry.step)
     course = WaterCourse.of(telemetry, machines)
     water = None if course is None else find_water(course, telemetry, machines, loads, bought)
@@ -126,7 +132,8 @@ def identify(telemetry: PlantTelemetry, machines: Sequence[Machine], progress: P
     )
     notes = _notes(telemetry, machines, suns) + _water_notes(telemetry, machines, course, water)
     shared = pairs_as_heated(held_back, sign)
-    model = PlantModel(telemetry.site.name, telemetry.step, box, maps, base | left, shared, source, sheet, water)
+    of = box, maps, base | left, shared, source, sheet, water, handler
+    model = PlantModel(telemetry.site.name, telemetry.step, *of)
     return Identified(model, telemetry, data, loads, tuple(errors), split, notes)
 
 
@@ -141,11 +148,11 @@ def _measured(machine: Machine, telemetry: PlantTelemetry) -> Machine:
     return replace(machine, heat="", air=())
 
 
-def _data(telemetry: PlantTelemetry, machines: Sequence[Machine]) -> GreyBoxData:
-    """Collect the inputs of the grey box."""
+def _data(telemetry: PlantTelemetry, machines: Sequence[Machine], lost: FloatArray) -> GreyBoxData:
+    """Collect the inputs of the grey box, with heat of an air handler's own air to the zones, (n_time, n_zone) [W]."""
     sun = np.column_stack([*telemetry.suns.values()]) if telemetry.suns else np.empty((len(telemetry.frame), 0))
     heat = np.column_stack([machine.sign * machine.signal(telemetry) for machine in machines])
-    return GreyBoxData(telemetry.step, telemetry.zone, telemetry.outdoor, sun, heat, telemetry.gain)
+    return GreyBoxData(telemetry.step, telemetry.zone, telemetry.outdoor, sun, heat, telemetry.gain + lost)
 
 
 def _loads(telemetry: PlantTelemetry, machines: Sequence[Machine], data: GreyBoxData, box: GreyBox) -> Loads:
@@ -206,7 +213,9 @@ def _notes(telemetry: PlantTelemetry, machines: Sequence[Machine], suns: Sequenc
     notes = []
     for machine in machines:
         if machine.air:
-            notes.append(f"heat of {machine.name} is that of its supply air, {machine.meter}")
+            cold = machine.supply
+            beyond = "" if cold is None else f" beyond {float(from_si(cold, 'degC', 'temperature')):.1f} degC"
+            notes.append(f"heat of {machine.name} is that of its supply air{beyond}, {machine.meter}")
         if not machine.meter:
             notes.append(f"no heat of {machine.name} is measured: it is counted in watts of what is bought at 7 degC")
         told = [telemetry.frame[c] for c in (f"{SET}{machine.name}", machine.name) if c in telemetry.frame]

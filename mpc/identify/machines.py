@@ -95,6 +95,8 @@ class Machine:
     air : tuple of str
         Where no column has its heat: those of the flow of its supply air, of that air's temperature and of the zone's;
         empty where these are not measured either.
+    supply : float or None
+        Of a box on an `AirHandler`: temperature of the air that it gets, beyond which its heat counts [K].
     """
 
     actuator: Actuator
@@ -105,6 +107,7 @@ class Machine:
     capacity: tuple[tuple[float, float], ...] = ()
     beside: Actuator | None = None
     air: tuple[str, ...] = ()
+    supply: float | None = None
 
     @property
     def name(self) -> str:
@@ -185,7 +188,8 @@ class Machine:
     def metered_heat(self, of: Callable[[str], Any]) -> Any:
         """Give the heat into its zones by what is measured, negative where it cools [W].
 
-        That of supply air is its flow times 1006 J/kg/K times how much warmer it is than the zone, as in case folders.
+        That of supply air is its flow times 1006 J/kg/K times how much warmer it is than the zone, as in case folders,
+        or than the air that a box gets.
 
         Parameters
         ----------
@@ -194,8 +198,8 @@ class Machine:
         """
         if self.heat:
             return of(self.heat)
-        flow, supply, zone = (of(column) for column in self.air)
-        return AIR_HEAT_CAPACITY * flow * (supply - zone)
+        flow, discharge, zone = (of(column) for column in self.air)
+        return AIR_HEAT_CAPACITY * flow * (discharge - (zone if self.supply is None else self.supply))
 
     def signal(self, telemetry: PlantTelemetry) -> FloatArray:
         """Heat that it gives, or takes where it cools, or what is bought in its place, shape (n_time,) [W].

@@ -12,8 +12,10 @@ from typing import Any, Self
 import numpy as np
 
 from calibration.errors import CalibrationError
+from calibration.estimation.state_space import REFERENCE
 from calibration.grey_box.network import GreyBox
 from mpc.errors import ControlError, MpcError
+from mpc.identify.air_handler import AirHandler, running
 from mpc.identify.curves import Curve
 from mpc.identify.machines import Machine
 from mpc.identify.maps import MachineMap, OwnPower, led_heat
@@ -25,7 +27,7 @@ from mpc.loop.actuators import Actuator
 from thermal._types import FloatArray
 
 #: File of a model in its folder, and the version of its contents.
-FILE, FORMAT = "model.json", 8
+FILE, FORMAT = "model.json", 9
 
 #: A load that is none [-].
 _NOTHING = 1e-9
@@ -57,6 +59,8 @@ class PlantModel:
         such a share [-].
     water : SupplyWater or None
         Of that source, where its temperature is decided; largest loads are then those with the hottest.
+    air_handler : AirHandler or None
+        That the boxes share, whose heat is then beyond its air.
     """
 
     name: str
@@ -68,6 +72,7 @@ class PlantModel:
     source: Source | None = None
     sheet: tuple[tuple[float, float], ...] = ()
     water: SupplyWater | None = None
+    air_handler: AirHandler | None = None
 
     @property
     def sign(self) -> float:
@@ -127,6 +132,24 @@ class PlantModel:
             heat[..., k] = self.sign * found.at(found.heat, levels[..., k], outdoor, emitter[..., k])
         return heat
 
+    def lost(self, states: FloatArray, own: float, levels: FloatArray) -> FloatArray:
+        """Heat of an air handler's own air to the zones, shape (n_zone,), negative; zeros without one [W].
+
+        Parameters
+        ----------
+        states : ndarray, shape (n,)
+            Of the grey box, at the start of the step [K less the reference].
+        own : float
+            Share of the time that it runs by itself [-].
+        levels : ndarray, shape (n_machine,)
+            Duties and loads [-].
+        """
+        zones = len(self.box.zones)
+        if self.air_handler is None:
+            return np.zeros(zones)
+        air = self.air(states[:zones] + REFERENCE)
+        return np.asarray(self.air_handler.lost(float(running(np.asarray(own), levels)), air) @ self.box.serves)
+
     def bought(
         self, states: FloatArray, levels: FloatArray, outdoor: FloatArray | float,
         water: FloatArray | float | None = None,
@@ -157,10 +180,22 @@ class PlantModel:
             powers += self.water.bought(levels[..., : len(self.maps)], supply)
         return powers
 
-    @property
-    def bought_anyway(self) -> FloatArray:
-        """The same of `base`, shape (n_carrier,) [W]."""
-        return np.array([self.base.get(carrier, 0.0) for carrier in CARRIERS])
+    def bought_anyway(self, own: FloatArray, levels: FloatArray) -> FloatArray:
+        """Power of `base`, and of an air handler while it runs, shape (..., n_carrier) [W].
+
+        Parameters
+        ----------
+        own : ndarray, shape (...)
+            Share of the time that an air handler runs by itself [-].
+        levels : ndarray, shape (..., m)
+            Duties and loads, those of the machines first [-].
+        """
+        base = np.array([self.base.get(carrier, 0.0) for carrier in CARRIERS])
+        if self.air_handler is None:
+            return base
+        handled = np.array([self.air_handler.powers.get(carrier, 0.0) for carrier in CARRIERS])
+        runs = running(own, levels[..., : len(self.maps)])
+        return np.asarray(base + runs[..., None] * handled)
 
     def to_dict(self) -> dict[str, Any]:
         """Values for a file."""
@@ -179,6 +214,7 @@ class PlantModel:
             "base": dict(self.base), "source": None if self.source is None else asdict(self.source),
             "shared": [list(pair) for pair in self.shared], "sheet": [list(pair) for pair in self.sheet],
             "water": None if self.water is None else asdict(self.water),
+            "air_handler": None if self.air_handler is None else asdict(self.air_handler),
         }  # fmt: skip
 
     @classmethod
@@ -202,7 +238,8 @@ class PlantModel:
             box = GreyBox.from_dict(content["grey_box"])
             shared, sheet = (tuple((float(t), float(load)) for t, load in content[key]) for key in ("shared", "sheet"))
             base, source, water = dict(content["base"]), _source_of(content["source"]), _water_of(content["water"])
-            return cls(str(content["name"]), float(content["step"]), box, maps, base, shared, source, sheet, water)
+            name, step, handler = str(content["name"]), float(content["step"]), _handler_of(content["air_handler"])
+            return cls(name, step, box, maps, base, shared, source, sheet, water, handler)
         except (KeyError, TypeError, ValueError, MpcError, CalibrationError) as error:
             raise ControlError(where, expected, f"{type(error).__name__}: {error}") from error
 
@@ -212,7 +249,7 @@ def _map_of(entry: Mapping[str, Any]) -> MachineMap:
     sheet = tuple((float(outdoor), float(heat)) for outdoor, heat in told["capacity"])
     beside = None if told["beside"] is None else Actuator(**told["beside"])
     of = told["heat"], told["power"], sheet, beside, tuple(told["air"])
-    machine = Machine(Actuator(**told["actuator"]), told["role"], tuple(told["serves"]), *of)
+    machine = Machine(Actuator(**told["actuator"]), told["role"], tuple(told["serves"]), *of, told["supply"])
     powers = {kind: Curve(**curve) for kind, curve in entry["powers"].items()}
     limits = tuple((float(outdoor), float(load)) for outdoor, load in entry["limits"])
     heat, above = Curve(**entry["heat"]), tuple(entry["above"])
@@ -240,6 +277,14 @@ def _water_of(entry: Mapping[str, Any] | None) -> SupplyWater | None:
     shares, (level, slope) = tuple(float(share) for share in entry["shares"]), entry["own"]
     of = Actuator(**entry["actuator"]), float(entry["sign"]), shares, curves, float(entry["temperature"])
     return SupplyWater(*of, (float(level), float(slope)), float(entry["hottest"]), float(entry["below"]))
+
+
+def _handler_of(entry: Mapping[str, Any] | None) -> AirHandler | None:
+    if entry is None:
+        return None
+    hours = tuple((int(hour), bool(runs)) for hour, runs in entry["hours"])
+    of = tuple(float(capacity) for capacity in entry["conductances"]), dict(entry["powers"]), hours
+    return AirHandler(float(entry["supply"]), *of)
 
 
 def read_model(folder: Path) -> PlantModel:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from calibration.estimation.state_space import REFERENCE
 from calibration.results import Content
 from mpc.identify.curves import EMITTER, OUTDOOR, Curve, interval_of
 from mpc.identify.identify import Identified
@@ -19,6 +20,7 @@ from mpc.reports.figures.identify import course_pictures, error_pictures, map_pi
 from mpc.reports.means import Means
 from mpc.reports.page import clock, duration, listed, percent, render, significant, spell
 from mpc.studies.excited import Experiment
+from thermal.units import from_si
 
 #: What terms of a map are called.
 _TERMS = {
@@ -108,6 +110,7 @@ def identify_summary(found: Identified, made: Experiment | None) -> dict[str, An
         That led to it.
     """
     index, box = found.telemetry.frame.index, found.model.box
+    names = [m.machine.name for m in found.model.maps]
     return {
         "plant": found.model.name, "start": index[0].isoformat(), "end": index[-1].isoformat(),
         "held_out_from": index[found.split].isoformat(), "errors": [e.to_dict() for e in found.errors],
@@ -128,6 +131,10 @@ def identify_summary(found: Identified, made: Experiment | None) -> dict[str, An
         "water": None if found.model.water is None else {
             "actuator": found.model.water.actuator.name, "temperature": found.model.water.temperature,
             "dearer_by_kelvin": _dearer(found.model), "terms": [_told(row) for row in _water_terms(found.model.water)],
+        },
+        "air_handler": None if found.model.air_handler is None else {
+            "supply": found.model.air_handler.supply, "powers": dict(found.model.air_handler.powers),
+            "conductances": dict(zip(names, found.model.air_handler.conductances, strict=True)),
         },
         "time_constants_hours": (box.time_constants / 3600.0).tolist(), "heat_loss": box.heat_loss.tolist(),
         "unmeasured_heat": box.disturbance.to_dict(), "notes": list(found.notes),
@@ -172,6 +179,7 @@ def identify_verdict(found: Identified, made: Experiment | None) -> str:
     if found.model.water is not None:
         text += f"{found.model.water.actuator.name} is decided too: at full load a kelvin of it is worth "
         text += f"{100.0 * _dearer(found.model):.1f} % of what is bought. "
+    text += _air_handler_words(found.model)
     if made is not None:
         k = experiment_kpis(made)
         text += (
@@ -279,6 +287,17 @@ def _source_words(source: Source) -> str:
     return (
         f"Those of the source at {source.outdoor - 273.15:.0f} °C; below a load of {source.least:g} it goes on and off."
     )
+
+
+def _air_handler_words(model: PlantModel) -> str:
+    """Say what an air handler does to rooms that nobody heats; nothing without one."""
+    handler = model.air_handler
+    if handler is None:
+        return ""
+    cold = from_si(handler.supply, "degC", "temperature")
+    lost = sum(handler.conductances) * (REFERENCE - handler.supply)
+    words = f"One air handler blows {float(cold):.1f} °C at all of these rooms while it runs, and takes "
+    return words + f"{significant(lost / 1e3, 2)} kW from them at 20 °C; it runs for each of them that is heated. "
 
 
 def _water_words(water: SupplyWater) -> str:

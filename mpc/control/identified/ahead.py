@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 
 from mpc.control.identified.beyond import WEIGHTS
+from mpc.identify.air_handler import hours_of_week
 from mpc.identify.machines import as_heated
 from mpc.identify.model import PlantModel
 from mpc.identify.telemetry import CARRIERS, facade_sun
@@ -40,6 +42,10 @@ class Ahead:
         Weights of what machines buy beyond their maps, see `mpc.control.identified.beyond` [W].
     together : ndarray, shape (N,)
         Largest load of all machines that setpoints lead, a share of their full loads; infinite where none is known [-].
+    hours : ndarray of int, shape (N,)
+        Of the week, local.
+    running : ndarray, shape (N,)
+        Whether an air handler runs in hours of its own [-].
     """
 
     outdoor: FloatArray
@@ -51,6 +57,8 @@ class Ahead:
     occupied: np.ndarray
     beyond: FloatArray
     together: FloatArray
+    hours: np.ndarray
+    running: FloatArray
 
     def edges(self, sign: float) -> tuple[FloatArray, FloatArray]:
         """Give the edges that machines keep zones from, and those beyond which they never drive them, as `as_heated`.
@@ -108,4 +116,5 @@ class Ahead:
             columns(of_zones("internal_gain")) + model.box.parts["constant gain"],
             columns([*_PRICES.values()]), columns(edges[0]), columns(edges[1]), occupied,
             np.zeros((len(table), len(model.maps), WEIGHTS)), np.full(len(table), np.inf),
+            hours_of_week(pd.DatetimeIndex(table.index), model.step), np.zeros(len(table)),
         )  # fmt: skip

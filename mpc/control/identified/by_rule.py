@@ -58,6 +58,7 @@ def _rule(
     (transition, drive), m = problem.matrices, len(model.maps)
     first = 1 + len(model.box.suns)  # of the inputs: outdoor air, suns, heat of the machines, gains
     heated, others = drive[:, first : first + m], np.delete(drive, np.s_[first : first + m], axis=1)
+    blown = others[:, 1 + len(model.box.suns) :]  # what an air handler gives or takes is a gain
     exogenous = np.column_stack([parameters[:, :1] - REFERENCE, parameters[:, 1 : first + len(zones)]]) @ others.T
     near, shares, sign = max(round(LEAD / model.step), 1), model.shares, model.sign
     kept = ahead.edges(sign)[0] - REFERENCE  # mirrored where machines cool, as are what they add and what is left
@@ -66,7 +67,8 @@ def _rule(
     states[0] = state
     for n in range(count):
         edges = kept[n : n + near].max(axis=0)
-        rest = transition @ state + exogenous[n]
+        free = transition @ state + exogenous[n]
+        rest = free + blown @ model.lost(state, float(ahead.running[n]), levels[n])
         emitter = model.box.emitter(state)
         for k, (found, mine) in enumerate(zip(model.maps, served, strict=True)):
             edge = float(edges[mine].max())
@@ -84,6 +86,7 @@ def _rule(
         if shared > ahead.together[n]:
             levels[n, shares > 0.0] *= ahead.together[n] / shared
         heat = [problem.heat(k, levels[n, k], ahead.outdoor[n], emitter[k]) for k in range(m)]
+        rest = free + blown @ model.lost(state, float(ahead.running[n]), levels[n])
         state = rest + heated @ np.array(heat)
         states[n + 1] = state
     return states, levels
@@ -94,7 +97,8 @@ def _bought(
 ) -> tuple[float, float]:
     """Cost [currency] and heat [J] of levels along states, or what is taken where machines cool."""
     model = problem.model
-    powers = bought(model, ahead.beyond, states[:-1], levels, ahead.outdoor, water).sum(axis=1) + model.bought_anyway
+    powers = bought(model, ahead.beyond, states[:-1], levels, ahead.outdoor, water).sum(axis=1)
+    powers = powers + model.bought_anyway(ahead.running, levels)
     heat = model.box.delivered(model.heat(states[:-1], levels, ahead.outdoor), ahead.outdoor)
     cost = float((powers * ahead.prices).sum()) * model.step / KILOWATT_HOUR
     return cost, model.sign * float(heat.sum()) * model.step

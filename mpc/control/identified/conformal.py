@@ -24,9 +24,8 @@ AFTER, RISE = 3600.0, 0.5
 #: of what is asked for, whatever comes (range over η T), and a morning's violations change it by tenths of a kelvin.
 RATE = 0.05
 
-#: Kind of steps in which nobody is in, and the range of their back-off [K]: what thermostats hold too little, not what
-#: a machine cannot give on a cold night.
-_EMPTY, _EMPTY_RANGE = 2, (0.0, 0.2)
+#: Kind of steps in which nobody is in.
+_EMPTY = 2
 
 
 @dataclass(frozen=True)
@@ -61,9 +60,10 @@ class ConformalBackOff:
 
     ``b_{t+1} = clip(b_t + η (err_t - α))`` with ``err_t`` 1 where a zone is outside of its band in an occupied step,
     else 0; of each zone one b for the hour `AFTER` its lower edge has risen, and one for all others. Steps in which
-    nobody is in have a third within a small range, which learns by all of them and is never outwards of the band nor
-    less than the one of steps with people: a thermostat that holds a zone a little under what it is told does so at
-    night too. Summed up, the
+    nobody is in have a third, which is never outwards of the band nor less than the one of steps with people: a
+    thermostat that holds a zone a little under what it is told does so at night too. It learns by all of them in which
+    more heat was to be had, and by where a zone ends: one that was held and then falls is as much below the mean of the
+    step as that is below the one before, and what goes on and off at night lets it dip within steps. Summed up, the
     share of violations of each differs from α by at most ``(range + η) / (η T)`` after its T steps, whatever plant,
     model and weather do, as long as b is not held at an end of its range (Gibbs and Candès 2021, Adaptive conformal
     inference under distribution shift, doi:10.48550/arXiv.2106.00170, proposition 4.1; on the scale of the score
@@ -91,13 +91,12 @@ class ConformalBackOff:
 
     def __init__(self, asked: Guarantee, zones: int, start: float = 0.0) -> None:
         self.asked = asked
-        asked_ends = asked.lowest, asked.highest
-        ends = np.clip(_EMPTY_RANGE, *asked_ends)
-        self._lowest, self._highest = (np.array([end, end, empty]) for end, empty in zip(asked_ends, ends, strict=True))
+        self._lowest, self._highest = (np.array([end, end, max(end, 0.0)]) for end in (asked.lowest, asked.highest))
         self.values: FloatArray = np.clip(np.full((zones, 3), start), self._lowest, self._highest)
         self.outside, self.count = 0, 0
+        self._before = np.full(zones, np.nan)
 
-    def update(self, inside: FloatArray, occupied: BoolArray, risen: BoolArray) -> None:
+    def update(self, inside: FloatArray, occupied: BoolArray, risen: BoolArray, spent: BoolArray | None = None) -> None:
         """Learn from a step.
 
         Parameters
@@ -108,12 +107,17 @@ class ConformalBackOff:
             Zones with people, which count.
         risen : ndarray of bool, shape (n_zone,)
             Zones whose lower edge has risen within the hour.
+        spent : ndarray of bool, shape (n_zone,), optional
+            Zones that had all heat that there is; none by default.
         """
         seen, missed = np.isfinite(inside), inside < 0.0
         self.outside += int((missed & seen & occupied).sum())
         self.count += int((seen & occupied).sum())
         kind = _kinds(occupied, risen)
-        learns = np.flatnonzero(seen & (occupied | (kind == _EMPTY)))
+        empty, falls = kind == _EMPTY, np.nan_to_num(np.minimum(inside - self._before, 0.0))
+        missed[empty] = (inside + falls)[empty] < 0.0
+        more = empty if spent is None else empty & ~spent
+        learns, self._before = np.flatnonzero(seen & (occupied | more)), inside
         at = learns, kind[learns]
         moved = self.values[at] + RATE * (missed[learns] - self.asked.share)
         self.values[at] = np.clip(moved, self._lowest[kind[learns]], self._highest[kind[learns]])

@@ -192,7 +192,8 @@ class IdentifiedController:
         self._observe(measurements, ahead)
         outdoor, led = ahead.outdoor, self._thermostats
         led.expect(outdoor)
-        ahead = replace(ahead, beyond=self._learner.along(outdoor, led.most(outdoor)), together=led.together(outdoor))
+        beyond, by_itself = self._learner.along(outdoor, led.most(outdoor)), led.runs_by_itself(ahead)
+        ahead = replace(ahead, beyond=beyond, together=led.together(outdoor), running=by_itself)
         if self._plan is not None and len(self._plan.decisions) != len(outdoor):
             self._plan = None
         self._kept = self._back_off(ahead)
@@ -204,8 +205,7 @@ class IdentifiedController:
         solution = self._decided(ahead)
         whole = None if solution is None else solution.decisions[0]
         levels = self._by_rule(measurements, ahead) if whole is None else whole[: len(self.model.maps)]
-        source = "optimal plan" if solution is not None else "rules"
-        reasons = () if solution is not None else ("the solver found no plan",)
+        source, reasons = ("optimal plan", ()) if solution is not None else ("rules", ("the solver found no plan",))
         for runs in self._runs:
             runs.note(float(levels[runs.machine]))
         self._before, self._plan = (ahead, levels), solution
@@ -235,8 +235,9 @@ class IdentifiedController:
         self._observer.update(measurements, before, levels)
         kept = before.edges(self.model.sign)[0][:1]
         if self.conformal is not None:
-            realised = self._inside(measurements, before)
-            self.conformal.update(realised, before.occupied[0], risen(kept, self.model.step, self._edges)[0])
+            inside, spent = self._inside(measurements, before), self._thermostats.spent(levels, before)
+            after_rise = risen(kept, self.model.step, self._edges)[0]
+            self.conformal.update(inside, before.occupied[0], after_rise, spent)
         count = max(round(AFTER / self.model.step), 1)
         self._edges = np.vstack([self._edges, kept])[-count:]
 
@@ -395,5 +396,5 @@ class IdentifiedController:
         """Give expected electricity and other carriers, shape (N, 2) [W]."""
         states, water = solution.states[:-1], self._water_along(solution, ahead)
         by_map = bought(self.model, ahead.beyond, states, solution.decisions, ahead.outdoor, water)
-        powers = by_map.sum(axis=1) + self.model.bought_anyway
+        powers = by_map.sum(axis=1) + self.model.bought_anyway(ahead.running, solution.decisions)
         return np.column_stack([powers[:, 0], powers[:, 1:].sum(axis=1)])

@@ -44,6 +44,8 @@ class IdentifiedProblem:
     emitter's temperature at its start, power with what `mpc.control.identified.beyond` adds. Bands are those of the
     air nodes. Machines that setpoints lead keep to what one source has for all of them (`SharedLimit`); what it buys
     (`Source`) is a line over their load, a parameter of each step; what hotter water costs is added (`SupplyWater`).
+    Where they share an air handler (`AirHandler`) its running is the last decision: at least in hours of its own, which
+    are a parameter, and at least as long as any of them heats.
 
     Parameters
     ----------
@@ -73,6 +75,8 @@ class IdentifiedProblem:
             )  # it counts by tangents
         if model.water is not None:
             most += float(model.water.by_kelvin[0]) * (model.water.ends[1] - model.water.ends[0])
+        if model.air_handler is not None:
+            most += model.air_handler.powers.get(CARRIERS[0], 0.0)
         return ElectricStage(self.electric, 1.5 * most, model.step)
 
     @property
@@ -121,9 +125,10 @@ class IdentifiedProblem:
         model, box = self.model, self.model.box
         nz, ns, m = len(box.zones), len(box.suns), len(model.maps)
         line, hot = len(CARRIERS) if model.source is not None else 0, (0, 0) if model.water is None else (3, m)
-        sizes = [1, ns, nz, len(CARRIERS), m, m, m * WEIGHTS, 1, line, line, *hot]
+        handled = 0 if model.air_handler is None else 1
+        sizes = [1, ns, nz, len(CARRIERS), m, m, m * WEIGHTS, 1, line, line, *hot, handled]
         x, u, p, added = ca.SX.sym("x", 4 * nz), ca.SX.sym("u", m), ca.SX.sym("p", sum(sizes)), self._added
-        outdoor, sun, gain, price, low, high, weights, together, standing, by_load, water, most = ca.vertsplit(
+        outdoor, sun, gain, price, low, high, weights, together, standing, by_load, water, most, own = ca.vertsplit(
             p, np.cumsum([0, *sizes]).tolist()
         )
         chosen = low + (high - low) * u
@@ -143,6 +148,16 @@ class IdentifiedProblem:
         if model.water is not None:
             hotter, prices = model.water.hotter(chosen, chosen / most, water), model.water.by_kelvin
             powers += [(carrier, by * hotter) for carrier, by in zip(CARRIERS, prices, strict=True) if by]
+        within = total - together if model.shares.any() else ca.SX(0, 1)
+        runs = ca.SX.sym("runs", handled)
+        if model.air_handler is not None:
+            running = own + (1.0 - own) * runs
+            served, air = ca.DM(box.serves.astype(float)), REFERENCE + x[:nz]
+            of_rooms = ca.mtimes(served, air) / ca.sum2(served)
+            lost = running * ca.DM(model.air_handler.conductances) * (model.air_handler.supply - of_rooms)
+            gain = gain + ca.mtimes(served.T, lost)
+            powers += [(carrier, watts * running) for carrier, watts in model.air_handler.powers.items()]
+            within = ca.vertcat(within, chosen - high * running)
         cost, electricity = ca.SX(0), ca.SX(model.base.get(CARRIERS[0], 0.0))
         for carrier, power in powers:
             if added is not None and carrier == CARRIERS[0]:
@@ -159,8 +174,8 @@ class IdentifiedProblem:
             banded = ca.vertcat(banded, *(added.state[name] for name in added.banded))
             x, u = ca.vertcat(x, *added.state.values()), ca.vertcat(u, *added.decision.values())
             p = ca.vertcat(p, added.generation)
-        cost = SCALE * (cost + _EVEN * ca.sumsqr(u))
-        within, m = total - together if model.shares.any() else ca.SX(0, 1), u.numel()
+        u = ca.vertcat(u, runs)
+        cost, m = SCALE * (cost + _EVEN * ca.sumsqr(u)), u.numel()
         return StageProblem(x, u, p, following, cost, SCALE * end, banded, np.zeros(m), np.ones(m), within)
 
     def data(
@@ -209,6 +224,8 @@ class IdentifiedProblem:
             most = np.ones((count, len(self.model.maps))) if most is None else most
             zone = self.model.air(state[:zones] + REFERENCE)
             parameters = np.column_stack([parameters, self.model.water.line(planned, most, zone), most])
+        if self.model.air_handler is not None:
+            parameters = np.column_stack([parameters, ahead.running])
         # an edge lies in the bands of the step before and of the step after it; nothing can be done about the first
         near, far = ahead.edges(self.model.sign)
         near = np.minimum(near + back_off, far - _NARROWEST)

@@ -5,16 +5,19 @@ from __future__ import annotations
 from collections import deque
 
 import numpy as np
+import pandas as pd
 
 from calibration.estimation.state_space import REFERENCE
+from mpc.control.identified.ahead import Ahead
 from mpc.control.identified.forecast_error import ForecastError
+from mpc.identify.air_handler import WHOLE, RunningHours, hours_of_week
 from mpc.identify.limits import OUT_OF_REACH, HeatLimit
 from mpc.identify.machines import as_heated, pairs_as_heated
 from mpc.identify.model import PlantModel
 from mpc.identify.shared import SharedLimit, out_of_reach
 from mpc.identify.water import LATELY
 from mpc.loop.plant import Measurements
-from thermal._types import FloatArray
+from thermal._types import BoolArray, FloatArray
 
 #: A load below this is none [-], and one nearer than it to the largest is all.
 _IDLE = 0.02
@@ -52,6 +55,7 @@ class Thermostats:
         self._error = ForecastError(model.step)
         self._told, self._zone = np.full(len(model.maps), np.nan), np.full(len(model.box.zones), np.nan)
         self._served, self._water = model.box.serves, np.nan
+        self._hours = RunningHours(() if model.air_handler is None else model.air_handler.hours)
         self._supplied = deque[float](maxlen=max(round(LATELY / model.step), 1) + 1)
 
     def most(self, outdoor: FloatArray) -> FloatArray:
@@ -66,6 +70,19 @@ class Thermostats:
         if water is None or not np.isfinite(self._zone).all():
             return most
         return np.asarray(most * water.share(self._model.air(as_heated(self._zone, self._sign))))
+
+    def spent(self, levels: FloatArray, ahead: Ahead) -> BoolArray:
+        """Tell the zones all of whose machines give all that they have in the first step, shape (n_zone,).
+
+        Parameters
+        ----------
+        levels : ndarray, shape (n_machine,)
+            Planned loads [-].
+        ahead : Ahead
+            Of the coming steps.
+        """
+        full = levels >= self.most(ahead.outdoor[:1])[0] - _IDLE
+        return np.asarray(~(self._served & ~full[:, None]).any(axis=0))
 
     def with_hottest(self, outdoor: FloatArray) -> FloatArray:
         """Largest loads with the hottest water that a model knows, whatever the plant has, shape (N, n_machine) [-].
@@ -124,7 +141,7 @@ class Thermostats:
         weather, air = as_heated(outdoor, self._sign), as_heated(zone, self._sign)
         end = air + 0.5 * np.nan_to_num(np.maximum(air - self._zone, 0.0))
         self._zone = air
-        count = len(self._model.maps)
+        count, step = len(self._model.maps), self._model.step
         loads, missing = np.full(count, np.nan), np.full(count, -np.inf)
         for k in np.flatnonzero(self._is_led & np.isfinite(self._told)):
             found = self._model.maps[k]
@@ -132,6 +149,12 @@ class Thermostats:
             if np.isfinite(given):
                 loads[k] = given / float(found.at(found.heat, 1.0, outdoor, REFERENCE))
                 missing[k] = self._told[k] - float(np.nanmean(end[self._served[k]]))
+        if (handler := self._model.air_handler) is not None:
+            _, ran = handler.measured(measurements, [found.machine for found in self._model.maps])
+            if np.isfinite(ran) and not (loads > _IDLE).any() and (missing < -OUT_OF_REACH).all():
+                self._hours.learn(int(hours_of_week(pd.DatetimeIndex([measurements.stamp]), step)[0]), ran > 0.5)
+            if ran < WHOLE:  # of a part of a step nothing tells what boxes have at most
+                missing[:] = -np.inf
         full = np.array([found.above[1] for found in self._model.maps])
         wanted, reached = (loads > _IDLE) & out_of_reach(missing, full), loads
         if (water := self._model.water) is not None:
@@ -147,6 +170,18 @@ class Thermostats:
             # what several at their limit give at once says nothing of one of them alone
             if (alone[k] and missing[k] > OUT_OF_REACH) or reached[k] > self._limits[k].at(np.array([weather]))[0]:
                 self._limits[k].learn(weather, float(reached[k]))
+
+    def runs_by_itself(self, ahead: Ahead) -> FloatArray:
+        """Where an air handler runs whoever heats, shape (N,): 1 or 0; 0 without one [-].
+
+        Parameters
+        ----------
+        ahead : Ahead
+            Of the coming steps.
+        """
+        if self._model.air_handler is None:
+            return np.zeros(len(ahead.hours))
+        return self._hours.at(ahead.hours, np.asarray(ahead.occupied.any(axis=1)))
 
     def shares_all(self, levels: FloatArray, outdoor: FloatArray) -> bool:
         """Tell whether a step's loads take all that is relied on of a shared source.

@@ -22,7 +22,7 @@ def test_share_over_a_season(share: float, drift: float) -> None:
         inside = kept.values[0, 0] + miss + drift * np.sin(2 * np.pi * k / steps)
         kept.update(np.array([inside, np.nan]), np.array([True, True]), NONE)
         kept.update(np.array([-5.0, -5.0]), NONE, NONE)  # nobody is in
-    assert kept.count == steps and kept.values[1, 0] == 0.0 and kept.values[:, 2].tolist() == [0.2, 0.2]
+    assert kept.count == steps and kept.values[1, 0] == 0.0 and kept.values[:, 2].tolist() == [RANGE[1]] * 2
     seen = kept.outside / kept.count
     assert abs(seen - share) < 0.01 and abs(seen - share) <= (RANGE[1] - RANGE[0] + RATE) / (RATE * steps)
 
@@ -53,6 +53,23 @@ def test_hours_without_people_have_their_own_and_are_not_let_go() -> None:
     for _ in range(3000):
         kept.update(np.ones(2), NONE, NONE)
     assert kept.values[:, 2].tolist() == [0.0, 0.0] and (kept.values[:, 0] < -0.2).all()
+
+
+def test_what_goes_on_and_off_at_night_is_kept_from_the_edge_by_what_it_dips() -> None:
+    """Held in one step and falling in the next by 0.6 K: means are 0.3 K lower, its end is 0.6."""
+    kept, ends = ConformalBackOff(Guarantee(0.01), 2), []
+    for k in range(400):
+        held = kept.along(NONE[None], NONE[None])[0]
+        kept.update(held - 0.3 * (k % 2), NONE, NONE)
+        ends.append(held - 0.6 * (k % 2))
+    assert kept.values[:, 2] == pytest.approx(0.6, abs=0.06) and np.min(ends[100:]) > -0.05
+
+
+def test_a_machine_that_gives_all_it_has_at_night_is_no_reason_to_ask_for_more() -> None:
+    kept = ConformalBackOff(Guarantee(0.01), 2)
+    for _ in range(100):
+        kept.update(np.full(2, -0.4), NONE, NONE, np.array([True, False]))
+    assert kept.values[:, 2].tolist() == [0.0, RANGE[1]]
 
 
 def test_hours_after_a_rise() -> None:

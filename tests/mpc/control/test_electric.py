@@ -45,7 +45,8 @@ def plan(electric: Electric, price: np.ndarray, now: ElectricNow, load: np.ndarr
     """Plan with the heater's loads as they are."""
     problem, edge = IdentifiedProblem(model(), electric), np.ones((N, 1))
     ahead = Ahead(np.full(N, 278.15), np.zeros((N, 0)), np.zeros((N, 1)), np.outer(price, [1.0, 0.0, 0.0]),
-                  200.0 * edge, 400.0 * edge, edge > 0.0, np.zeros((N, 1, WEIGHTS)), np.full(N, np.inf))  # fmt: skip
+                  200.0 * edge, 400.0 * edge, edge > 0.0, np.zeros((N, 1, WEIGHTS)), np.full(N, np.inf),
+                 np.zeros(N, dtype=int), np.zeros(N))  # fmt: skip
     state = np.append(np.full(4, 293.15 - REFERENCE), 0.0)
     data = problem.data(state, ahead, 0.0 * edge, 10.0, (load[:, None], load[:, None]), now)
     guess = np.full((N, problem.decisions), 0.5)
@@ -98,7 +99,8 @@ def test_machines_shave_the_peak_where_there_is_no_battery() -> None:
     edge, peaks = np.ones((N, 1)), {}
     price = np.where(np.arange(N) % 8 < 4, 0.2, 0.25)
     ahead = Ahead(np.full(N, 285.15), np.zeros((N, 0)), np.zeros((N, 1)), np.outer(price, [1.0, 0.0, 0.0]),
-                  293.15 * edge, 303.15 * edge, edge > 0.0, np.zeros((N, 1, WEIGHTS)), np.full(N, np.inf))  # fmt: skip
+                  293.15 * edge, 303.15 * edge, edge > 0.0, np.zeros((N, 1, WEIGHTS)), np.full(N, np.inf),
+                 np.zeros(N, dtype=int), np.zeros(N))  # fmt: skip
     state = np.append([293.65 - REFERENCE] * 3 + [290.0 - REFERENCE], 0.0)
     for demand, each in problem.items():
         data = each.data(state, ahead, 0.0 * edge, 10.0, (0.0 * edge, edge), None)

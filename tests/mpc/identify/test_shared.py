@@ -219,7 +219,8 @@ def test_a_plan_keeps_to_what_the_source_has() -> None:
     problem = IdentifiedProblem(model)
     edge = np.where(np.arange(n)[:, None] < 32, 288.15, 293.15) * np.ones((1, 4))
     ahead = Ahead(np.full(n, 263.15), np.zeros((n, 0)), np.zeros((n, 4)), np.full((n, 3), 0.2), edge, edge + 10.0,
-                  edge > 0.0, np.zeros((n, 4, WEIGHTS)), np.full(n, np.inf))  # fmt: skip
+                  edge > 0.0, np.zeros((n, 4, WEIGHTS)), np.full(n, np.inf),
+                 np.zeros(n, dtype=int), np.zeros(n))  # fmt: skip
     guess, ends, most = np.full((n, 4), 0.3), (np.zeros((n, 4)), np.full((n, 4), 1.2)), []
     start = np.concatenate([np.full(16, -5.0), np.zeros(4)])
     for each in (ahead, replace(ahead, together=np.full(n, 0.4))):

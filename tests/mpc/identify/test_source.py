@@ -206,7 +206,8 @@ def _ahead(n: int, edge: float = 293.15) -> Ahead:
     rng = np.random.default_rng(2)
     price = np.repeat(rng.uniform(0.1, 0.4, (n // 4, 1)), 4, axis=0) * np.ones((1, 3))
     return Ahead(np.full(n, 271.15), np.zeros((n, 0)), np.zeros((n, 4)), price, lower, lower + 5.0, lower > 0.0,
-                 np.zeros((n, 4, WEIGHTS)), np.full(n, np.inf))  # fmt: skip
+                 np.zeros((n, 4, WEIGHTS)), np.full(n, np.inf),
+                 np.zeros(n, dtype=int), np.zeros(n))  # fmt: skip
 
 
 def _controller(model: PlantModel, electric: Electric | None = None) -> IdentifiedController:

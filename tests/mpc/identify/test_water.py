@@ -306,7 +306,7 @@ def ahead_of(model: PlantModel, count: int = 24) -> Ahead:
     return Ahead(
         np.full(count, 265.0), np.empty((count, 0)), nothing, np.tile([0.3, 0.0, 0.0][: len(CARRIERS)], (count, 1)),
         nothing + 293.15, nothing + 297.15, np.ones((count, 2), dtype=bool), np.zeros((count, 2, WEIGHTS)),
-        np.full(count, np.inf),
+        np.full(count, np.inf), np.zeros(count, dtype=int), np.zeros(count),
     )  # fmt: skip
 
 
