@@ -20,6 +20,9 @@ from thermal.units import AIR_HEAT_CAPACITY
 #: Share of a box's usual flow from which its air handler runs [-], and of the steps in which all boxes agree on that.
 _RUNS, _AGREE = 0.2, 0.95
 
+#: Flow over the usual one that is more than steady [-], and the share of the steps that may have more.
+_STEADY, _MORE = 1.15, 0.2
+
 #: How cold the air of boxes that heat nothing is within [K], in which share of the steps some box shows it [-], and how
 #: much colder than the rooms it is at least [K]. Air that the handler itself heats at times is not of this kind.
 _SAME, _SHOWN, _COLDER = 1.0, 0.2, 3.0
@@ -97,17 +100,18 @@ class AirHandler:
         return np.asarray(np.minimum(flow / usual, 1.0).mean(axis=-1))
 
 
-def running(own: FloatArray, levels: FloatArray) -> FloatArray:
-    """Share of the time that an air handler runs, shape (...) [-].
+def running(own: FloatArray, levels: FloatArray, most: FloatArray) -> FloatArray:
+    """Share of the time that an air handler runs where boxes heat together, shape (...) [-].
 
     Parameters
     ----------
     own : ndarray, shape (...)
         That in hours of its own [-].
-    levels : ndarray, shape (..., n_machine)
-        Loads of the boxes [-].
+    levels, most : ndarray, shape (..., n_machine)
+        Loads of the boxes, and the largest of those [-].
     """
-    return np.asarray(np.maximum(own, np.clip(levels.max(axis=-1), 0.0, 1.0)))
+    shares = np.divide(levels, most, out=np.zeros_like(levels), where=most > 0.0)
+    return np.asarray(np.maximum(own, np.clip(shares.max(axis=-1), 0.0, 1.0)))
 
 
 class RunningHours:
@@ -202,7 +206,8 @@ def find_air_handler(
     Returns
     -------
     AirHandler or None
-        None unless all machines are boxes that heat, whose flow begins and ends together, and some show cold air.
+        None unless all machines are boxes that heat, whose steady flow begins and ends together, and some show cold
+        air.
     list of Machine
         Those given; with an air handler each with its air.
     ndarray, shape (n_time, n_zone)
@@ -224,8 +229,10 @@ def find_air_handler(
     on = flow > _RUNS * usual
     runs = on.mean(axis=1) > 0.5
     coldest = np.where(on & np.isfinite(discharge), discharge, np.inf).min(axis=1)
-    if (on == runs[:, None]).mean() < _AGREE or not runs.any():
+    steady = ((flow > _STEADY * usual) & on).sum(axis=0) <= _MORE * on.sum(axis=0)
+    if (on == runs[:, None]).all(axis=1).mean() < _AGREE or not (runs & np.isfinite(coldest)).any() or not steady.all():
         return nothing
+    runs &= np.isfinite(coldest)
     supply = float(np.quantile(coldest[runs], 0.05))
     shown = np.mean(coldest[runs] < supply + _SAME)
     if shown < _SHOWN or supply > float(np.nanmean(air[runs])) - _COLDER:

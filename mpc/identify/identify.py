@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import pandas as pd
 
 from calibration.grey_box.fit import GreyBoxData, fit_grey_box, follow
 from calibration.grey_box.judge import LeadError, judge
@@ -195,12 +196,12 @@ def _water_notes(
 
 def _above(telemetry: PlantTelemetry, machines: Sequence[Machine]) -> FloatArray:
     """How far setpoints lie above the air at the ends of the steps, below it of cooling, (n_time, n_machine) [K]."""
-    columns = []
+    columns, zones, names = [], telemetry.zone, list(telemetry.site.areas)
     for machine in machines:
         set_to = telemetry.frame.get(f"{SET}{machine.name}")
         measured = telemetry.frame.get(machine.name)
         value = set_to if set_to is not None and set_to.notna().any() else measured
-        mean = telemetry.frame[f"{machine.serves[0]}/{ZONE_TEMPERATURE}"]
+        mean = pd.Series(zones[:, names.index(machine.serves[0])], index=telemetry.frame.index)
         zone = 0.5 * (mean + mean.shift(-1))
         if machine.role == "setpoint" and value is not None:
             columns.append(machine.sign * (value - zone).to_numpy(dtype=float))

@@ -15,7 +15,7 @@ from calibration.errors import CalibrationError
 from calibration.estimation.state_space import REFERENCE
 from calibration.grey_box.network import GreyBox
 from mpc.errors import ControlError, MpcError
-from mpc.identify.air_handler import AirHandler, running
+from mpc.identify.air_handler import AirHandler
 from mpc.identify.curves import Curve
 from mpc.identify.machines import Machine
 from mpc.identify.maps import MachineMap, OwnPower, led_heat
@@ -132,23 +132,21 @@ class PlantModel:
             heat[..., k] = self.sign * found.at(found.heat, levels[..., k], outdoor, emitter[..., k])
         return heat
 
-    def lost(self, states: FloatArray, own: float, levels: FloatArray) -> FloatArray:
+    def lost(self, states: FloatArray, running: float) -> FloatArray:
         """Heat of an air handler's own air to the zones, shape (n_zone,), negative; zeros without one [W].
 
         Parameters
         ----------
         states : ndarray, shape (n,)
             Of the grey box, at the start of the step [K less the reference].
-        own : float
-            Share of the time that it runs by itself [-].
-        levels : ndarray, shape (n_machine,)
-            Duties and loads [-].
+        running : float
+            Share of the time that it runs [-].
         """
         zones = len(self.box.zones)
         if self.air_handler is None:
             return np.zeros(zones)
         air = self.air(states[:zones] + REFERENCE)
-        return np.asarray(self.air_handler.lost(float(running(np.asarray(own), levels)), air) @ self.box.serves)
+        return np.asarray(self.air_handler.lost(running, air) @ self.box.serves)
 
     def bought(
         self, states: FloatArray, levels: FloatArray, outdoor: FloatArray | float,
@@ -180,22 +178,19 @@ class PlantModel:
             powers += self.water.bought(levels[..., : len(self.maps)], supply)
         return powers
 
-    def bought_anyway(self, own: FloatArray, levels: FloatArray) -> FloatArray:
+    def bought_anyway(self, running: FloatArray) -> FloatArray:
         """Power of `base`, and of an air handler while it runs, shape (..., n_carrier) [W].
 
         Parameters
         ----------
-        own : ndarray, shape (...)
-            Share of the time that an air handler runs by itself [-].
-        levels : ndarray, shape (..., m)
-            Duties and loads, those of the machines first [-].
+        running : ndarray, shape (...)
+            Share of the time that an air handler runs [-].
         """
         base = np.array([self.base.get(carrier, 0.0) for carrier in CARRIERS])
         if self.air_handler is None:
             return base
         handled = np.array([self.air_handler.powers.get(carrier, 0.0) for carrier in CARRIERS])
-        runs = running(own, levels[..., : len(self.maps)])
-        return np.asarray(base + runs[..., None] * handled)
+        return np.asarray(base + np.asarray(running)[..., None] * handled)
 
     def to_dict(self) -> dict[str, Any]:
         """Values for a file."""

@@ -45,7 +45,7 @@ class Ahead:
     hours : ndarray of int, shape (N,)
         Of the week, local.
     running : ndarray, shape (N,)
-        Whether an air handler runs in hours of its own [-].
+        Share that an air handler runs: by itself before a plan, and as planned in what is kept of it [-].
     """
 
     outdoor: FloatArray

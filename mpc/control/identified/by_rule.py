@@ -10,8 +10,12 @@ from mpc.control.identified.ahead import Ahead
 from mpc.control.identified.beyond import bought
 from mpc.control.identified.problem import IdentifiedProblem
 from mpc.control.rule_estimate import RuleEstimate
+from mpc.identify.air_handler import running
 from mpc.scenario.rates import KILOWATT_HOUR
 from thermal._types import FloatArray
+
+#: Times that the loads of boxes on one air handler are sized: more of them is more cold air.
+_SIZED = 4
 
 
 def estimate_rule(
@@ -44,10 +48,11 @@ def estimate_rule(
     """
     states, levels = planned
     by_rule = _rule(problem, ahead, parameters, (states[0], most, on))
-    cost, heat = _bought(problem, ahead, *by_rule)
+    cost, heat = _bought(problem, ahead, *by_rule, running(ahead.running, by_rule[1], most))
     left = problem.model.sign * float(problem.model.box.capacity @ (states[-1] - by_rule[0][-1]))
     stored = left * cost / heat if heat > 0.0 else 0.0
-    return RuleEstimate(_bought(problem, ahead, states, levels, water)[0], cost, stored)
+    of_plan = _bought(problem, ahead, states, levels, problem.running(ahead.running, levels), water)
+    return RuleEstimate(of_plan[0], cost, stored)
 
 
 def _rule(
@@ -67,38 +72,39 @@ def _rule(
     states[0] = state
     for n in range(count):
         edges = kept[n : n + near].max(axis=0)
-        free = transition @ state + exogenous[n]
-        rest = free + blown @ model.lost(state, float(ahead.running[n]), levels[n])
-        emitter = model.box.emitter(state)
-        for k, (found, mine) in enumerate(zip(model.maps, served, strict=True)):
-            edge = float(edges[mine].max())
-            if found.operation == "setpoint":
-                gained = sign * heated[:, k] * problem.heat(k, 1.0, ahead.outdoor[n], emitter[k])
-                idle, wide = found.above[0], found.above[1] - found.above[0]
-                rise = float(gained[: len(zones)][mine].mean()) + wide
-                missing = edge - idle - sign * float(rest[: len(zones)][mine].mean())
-                levels[n, k] = np.clip(missing / rise, 0.0, most[n, k]) if rise > 0.0 else 0.0
-                continue
-            above = float(state[: len(zones)][mine].min()) - edge
-            runs[k] = above < 0.0 or (runs[k] and above <= DIFFERENCE)
-            levels[n, k] = most[n, k] * runs[k]
+        free, emitter = transition @ state + exogenous[n], model.box.emitter(state)
+        for _ in range(1 if model.air_handler is None else _SIZED):  # an air handler runs for what boxes ask for
+            rest = free + blown @ model.lost(state, float(running(ahead.running[n], levels[n], most[n])))
+            for k, (found, mine) in enumerate(zip(model.maps, served, strict=True)):
+                edge = float(edges[mine].max())
+                if found.operation == "setpoint":
+                    gained = sign * heated[:, k] * problem.heat(k, 1.0, ahead.outdoor[n], emitter[k])
+                    idle, wide = found.above[0], found.above[1] - found.above[0]
+                    rise = float(gained[: len(zones)][mine].mean()) + wide
+                    missing = edge - idle - sign * float(rest[: len(zones)][mine].mean())
+                    levels[n, k] = np.clip(missing / rise, 0.0, most[n, k]) if rise > 0.0 else 0.0
+                    continue
+                above = float(state[: len(zones)][mine].min()) - edge
+                runs[k] = above < 0.0 or (runs[k] and above <= DIFFERENCE)
+                levels[n, k] = most[n, k] * runs[k]
         shared = float(shares @ levels[n])
         if shared > ahead.together[n]:
             levels[n, shares > 0.0] *= ahead.together[n] / shared
         heat = [problem.heat(k, levels[n, k], ahead.outdoor[n], emitter[k]) for k in range(m)]
-        rest = free + blown @ model.lost(state, float(ahead.running[n]), levels[n])
-        state = rest + heated @ np.array(heat)
+        lost = model.lost(state, float(running(ahead.running[n], levels[n], most[n])))
+        state = free + blown @ lost + heated @ np.array(heat)
         states[n + 1] = state
     return states, levels
 
 
 def _bought(
-    problem: IdentifiedProblem, ahead: Ahead, states: FloatArray, levels: FloatArray, water: FloatArray | None = None
-) -> tuple[float, float]:
-    """Cost [currency] and heat [J] of levels along states, or what is taken where machines cool."""
+    problem: IdentifiedProblem, ahead: Ahead, states: FloatArray, levels: FloatArray, runs: FloatArray,
+    water: FloatArray | None = None,
+) -> tuple[float, float]:  # fmt: skip
+    """Cost [currency] and heat [J] of levels along states, or what is taken where machines cool; as an air handler runs."""
     model = problem.model
     powers = bought(model, ahead.beyond, states[:-1], levels, ahead.outdoor, water).sum(axis=1)
-    powers = powers + model.bought_anyway(ahead.running, levels)
+    powers = powers + model.bought_anyway(runs)
     heat = model.box.delivered(model.heat(states[:-1], levels, ahead.outdoor), ahead.outdoor)
     cost = float((powers * ahead.prices).sum()) * model.step / KILOWATT_HOUR
     return cost, model.sign * float(heat.sum()) * model.step

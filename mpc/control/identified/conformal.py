@@ -62,8 +62,8 @@ class ConformalBackOff:
     else 0; of each zone one b for the hour `AFTER` its lower edge has risen, and one for all others. Steps in which
     nobody is in have a third, which is never outwards of the band nor less than the one of steps with people: a
     thermostat that holds a zone a little under what it is told does so at night too. It learns by all of them in which
-    more heat was to be had, and by where a zone ends: one that was held and then falls is as much below the mean of the
-    step as that is below the one before, and what goes on and off at night lets it dip within steps. Summed up, the
+    more heat was to be had, and by where a zone ends, on a straight line from the end of the step before: what goes on
+    and off at night lets a zone dip within steps. Summed up, the
     share of violations of each differs from α by at most ``(range + η) / (η T)`` after its T steps, whatever plant,
     model and weather do, as long as b is not held at an end of its range (Gibbs and Candès 2021, Adaptive conformal
     inference under distribution shift, doi:10.48550/arXiv.2106.00170, proposition 4.1; on the scale of the score
@@ -94,7 +94,7 @@ class ConformalBackOff:
         self._lowest, self._highest = (np.array([end, end, max(end, 0.0)]) for end in (asked.lowest, asked.highest))
         self.values: FloatArray = np.clip(np.full((zones, 3), start), self._lowest, self._highest)
         self.outside, self.count = 0, 0
-        self._before = np.full(zones, np.nan)
+        self._before, self._fell = np.full(zones, np.nan), np.zeros(zones)
 
     def update(self, inside: FloatArray, occupied: BoolArray, risen: BoolArray, spent: BoolArray | None = None) -> None:
         """Learn from a step.
@@ -114,8 +114,10 @@ class ConformalBackOff:
         self.outside += int((missed & seen & occupied).sum())
         self.count += int((seen & occupied).sum())
         kind = _kinds(occupied, risen)
-        empty, falls = kind == _EMPTY, np.nan_to_num(np.minimum(inside - self._before, 0.0))
-        missed[empty] = (inside + falls)[empty] < 0.0
+        # a straight line from where the step before ended has its mean halfway to where this one ends
+        falls, empty = np.nan_to_num(np.maximum(self._before - inside, 0.0)), kind == _EMPTY
+        missed[empty] = (inside - np.maximum(falls - 0.5 * self._fell, 0.0))[empty] < 0.0
+        self._fell = falls
         more = empty if spent is None else empty & ~spent
         learns, self._before = np.flatnonzero(seen & (occupied | more)), inside
         at = learns, kind[learns]

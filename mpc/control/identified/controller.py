@@ -203,23 +203,24 @@ class IdentifiedController:
         on = np.zeros(len(self.model.maps), dtype=bool)
         on[[runs.machine for runs in self._runs]] = [runs.on for runs in self._runs]
         solution = self._decided(ahead)
-        whole = None if solution is None else solution.decisions[0]
+        decided = None if solution is None else solution.decisions
+        whole = None if decided is None else decided[0]
         levels = self._by_rule(measurements, ahead) if whole is None else whole[: len(self.model.maps)]
         source, reasons = ("optimal plan", ()) if solution is not None else ("rules", ("the solver found no plan",))
         for runs in self._runs:
             runs.note(float(levels[runs.machine]))
-        self._before, self._plan = (ahead, levels), solution
+        planned = replace(ahead, running=self._problem.running(ahead.running, decided))
+        self._before, self._plan = (planned, levels), solution
         values = self._values(levels, solution, ahead, measurements)
         if whole is not None:
             values |= self._problem.command(whole)
         if self._meter is not None:
-            self._meter.note(levels, values, ahead, self._observer.state)
+            self._meter.note(levels, values, planned, self._observer.state)
         action = PlannedAction(values, measurements.stamp, source, reasons)
         action.step, action.seconds = self.model.step, time.perf_counter() - begin
         if solution is not None:
-            action.solution = solution
+            action.solution, action.power = solution, self._powers(solution, planned)
             action.zone = solution.states[:, : len(self.model.box.zones)] + REFERENCE
-            action.power = self._powers(solution, ahead)
             action.compare = self._compared(solution, ahead, on) if self._meter is None else None
         return action
 
@@ -396,5 +397,5 @@ class IdentifiedController:
         """Give expected electricity and other carriers, shape (N, 2) [W]."""
         states, water = solution.states[:-1], self._water_along(solution, ahead)
         by_map = bought(self.model, ahead.beyond, states, solution.decisions, ahead.outdoor, water)
-        powers = by_map.sum(axis=1) + self.model.bought_anyway(ahead.running, solution.decisions)
+        powers = by_map.sum(axis=1) + self.model.bought_anyway(ahead.running)
         return np.column_stack([powers[:, 0], powers[:, 1:].sum(axis=1)])

@@ -77,5 +77,5 @@ class ElectricMeter:
         water = None if self.model.water is None else values.get(self.model.water.actuator.name)
         self._modelled = bought(self.model, ahead.beyond[0], state, levels, ahead.outdoor[0], water)[:, 0]
         power = 0.0 if self.electric.battery is None else self.electric.battery.power
-        base = float(self.model.bought_anyway(ahead.running[0], levels)[0])
+        base = float(self.model.bought_anyway(ahead.running[0])[0])
         self._net = base + power * values.get(self.electric.command, 0.0) - self._generation

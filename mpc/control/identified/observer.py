@@ -94,7 +94,7 @@ class GreyBoxObserver:
         told = np.array([m.sign * m.given(measurements) if m.meter else np.nan for m in machines])
         heat = np.where(np.isfinite(told), told, model.heat(self.state, levels, outdoor))
         given = model.box.delivered(heat, np.asarray(outdoor))
-        gain = before.gain[0] + self._of_air_handler(measurements, float(before.running[0]), levels)
+        gain = before.gain[0] + self._of_air_handler(measurements, float(before.running[0]))
         u = np.concatenate([[outdoor - REFERENCE], before.sun[0], given, gain])
         error = self.zones(measurements) - REFERENCE - self._whole.observation @ self.state - space.feedthrough @ u
         corrected = self.state + self._gain @ np.nan_to_num(error)
@@ -102,11 +102,11 @@ class GreyBoxObserver:
         self.state[: space.order] += space.drive @ u
         return np.asarray(error)
 
-    def _of_air_handler(self, measurements: Measurements, own: float, levels: FloatArray) -> FloatArray:
+    def _of_air_handler(self, measurements: Measurements, running: float) -> FloatArray:
         """Heat of an air handler's own air to the zones, as measured, else as planned, shape (n_zone,) [W]."""
         model, handler = self.model, self.model.air_handler
         if handler is None:
             return np.zeros(len(model.box.zones))
         told, _ = handler.measured(measurements, [found.machine for found in model.maps])
         known = np.isfinite(told).all()
-        return np.asarray(told @ model.box.serves) if known else model.lost(self.state, own, levels)
+        return np.asarray(told @ model.box.serves) if known else model.lost(self.state, running)

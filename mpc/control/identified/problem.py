@@ -95,7 +95,22 @@ class IdentifiedProblem:
         added = self._added
         if added is None or added.electric.battery is None:
             return {}
-        return {added.electric.command: added.command(decisions[len(self.model.maps) :])}
+        first = len(self.model.maps)
+        return {added.electric.command: added.command(decisions[first : first + len(added.decision)])}
+
+    def running(self, own: FloatArray, decisions: FloatArray | None) -> FloatArray:
+        """Share of the steps that an air handler runs by a plan, shape (N,) [-].
+
+        Parameters
+        ----------
+        own : ndarray, shape (N,)
+            That in hours of its own [-].
+        decisions : ndarray, shape (N, n_decision), or None
+            Of the plan, where there is one [-].
+        """
+        if self.model.air_handler is None or decisions is None:
+            return own
+        return np.asarray(own + (1.0 - own) * np.clip(decisions[:, -1], 0.0, 1.0))
 
     @cached_property
     def matrices(self) -> tuple[FloatArray, FloatArray]:
@@ -157,7 +172,8 @@ class IdentifiedProblem:
             lost = running * ca.DM(model.air_handler.conductances) * (model.air_handler.supply - of_rooms)
             gain = gain + ca.mtimes(served.T, lost)
             powers += [(carrier, watts * running) for carrier, watts in model.air_handler.powers.items()]
-            within = ca.vertcat(within, chosen - high * running)
+            # as long as each heats; and no longer than all ask for, one after the other: by itself it cools nobody
+            within = ca.vertcat(within, chosen - high * running, runs - ca.sum1(u))
         cost, electricity = ca.SX(0), ca.SX(model.base.get(CARRIERS[0], 0.0))
         for carrier, power in powers:
             if added is not None and carrier == CARRIERS[0]:

@@ -72,7 +72,7 @@ class Thermostats:
         return np.asarray(most * water.share(self._model.air(as_heated(self._zone, self._sign))))
 
     def spent(self, levels: FloatArray, ahead: Ahead) -> BoolArray:
-        """Tell the zones all of whose machines give all that they have in the first step, shape (n_zone,).
+        """Tell the zones all of whose machines, or whose source, give all that they have in the first step, (n_zone,).
 
         Parameters
         ----------
@@ -82,6 +82,7 @@ class Thermostats:
             Of the coming steps.
         """
         full = levels >= self.most(ahead.outdoor[:1])[0] - _IDLE
+        full |= (self._shared.shares > 0.0) & self.shares_all(levels, ahead.outdoor[:1])
         return np.asarray(~(self._served & ~full[:, None]).any(axis=0))
 
     def with_hottest(self, outdoor: FloatArray) -> FloatArray:
@@ -146,14 +147,14 @@ class Thermostats:
         for k in np.flatnonzero(self._is_led & np.isfinite(self._told)):
             found = self._model.maps[k]
             given = found.machine.given(measurements)
-            if np.isfinite(given):
+            if np.isfinite(given) and np.isfinite(end[self._served[k]]).any():
                 loads[k] = given / float(found.at(found.heat, 1.0, outdoor, REFERENCE))
                 missing[k] = self._told[k] - float(np.nanmean(end[self._served[k]]))
         if (handler := self._model.air_handler) is not None:
             _, ran = handler.measured(measurements, [found.machine for found in self._model.maps])
-            if np.isfinite(ran) and not (loads > _IDLE).any() and (missing < -OUT_OF_REACH).all():
+            if np.isfinite(ran) and (loads <= _IDLE).all() and (missing < -OUT_OF_REACH).all():
                 self._hours.learn(int(hours_of_week(pd.DatetimeIndex([measurements.stamp]), step)[0]), ran > 0.5)
-            if ran < WHOLE:  # of a part of a step nothing tells what boxes have at most
+            if not ran >= WHOLE:  # of a part of a step nothing tells what boxes have at most, nor without its flows
                 missing[:] = -np.inf
         full = np.array([found.above[1] for found in self._model.maps])
         wanted, reached = (loads > _IDLE) & out_of_reach(missing, full), loads

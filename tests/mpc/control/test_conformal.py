@@ -65,6 +65,21 @@ def test_what_goes_on_and_off_at_night_is_kept_from_the_edge_by_what_it_dips() -
     assert kept.values[:, 2] == pytest.approx(0.6, abs=0.06) and np.min(ends[100:]) > -0.05
 
 
+@pytest.mark.parametrize("fall", [0.1, 0.3, 0.6])
+def test_a_zone_that_coasts_and_is_held_in_time_needs_no_distance(fall: float) -> None:
+    """An ideal thermostat catches it at the edge with its distance: it never ends below."""
+    kept, wall = ConformalBackOff(Guarantee(0.01), 1), np.zeros(1, dtype=bool)
+    for _ in range(60):
+        start = 3.0
+        for _ in range(32):
+            edge = float(kept.along(wall[None], wall[None])[0, 0])
+            end = max(start - fall, edge)
+            falls = (start - end) / fall  # share of the step until it is caught
+            kept.update(np.array([0.5 * (start + end) * falls + end * (1.0 - falls)]), wall, wall)
+            start = end
+    assert kept.values[0, 2] < 0.25 * fall + 0.05
+
+
 def test_a_machine_that_gives_all_it_has_at_night_is_no_reason_to_ask_for_more() -> None:
     kept = ConformalBackOff(Guarantee(0.01), 2)
     for _ in range(100):

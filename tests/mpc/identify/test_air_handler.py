@@ -11,12 +11,20 @@ import pytest
 from calibration.estimation.state_space import REFERENCE
 from calibration.grey_box.network import GreyBox
 from mpc.control.identified.ahead import Ahead
-from mpc.control.identified.by_rule import estimate_rule
+from mpc.control.identified.by_rule import _rule, estimate_rule
 from mpc.control.identified.controller import IdentifiedController, IdentifiedSettings
+from mpc.control.identified.electric import Electric
 from mpc.control.identified.observer import GreyBoxObserver
 from mpc.control.identified.problem import IdentifiedProblem
 from mpc.control.identified.thermostats import Thermostats
-from mpc.identify.air_handler import AirHandler, RunningHours, find_air_handler, hours_of_week, told_by_whole_steps
+from mpc.identify.air_handler import (
+    AirHandler,
+    RunningHours,
+    find_air_handler,
+    hours_of_week,
+    running,
+    told_by_whole_steps,
+)
 from mpc.identify.curves import Curve
 from mpc.identify.identify import identify
 from mpc.identify.machines import Machine
@@ -29,6 +37,7 @@ from mpc.scenario.forecast import Forecast
 from thermal._types import FloatArray
 from thermal.case.building import Location
 from thermal.case.points import DISCHARGE_TEMPERATURE, OUTDOOR_TEMPERATURE, SUPPLY_FLOW, ZONE_TEMPERATURE
+from thermal.components.battery import Battery
 
 STEP, SUPPLY, FAN = 900.0, 286.0, 400.0
 PLACE = Location(latitude=41.0, longitude=-87.0, elevation=200.0, timezone="Etc/GMT+6")
@@ -173,12 +182,11 @@ def test_a_step_of_the_plan_is_that_of_the_building() -> None:
         even = 1e-4 * (np.square(levels).sum() + extra[k] ** 2)
         assert float(cost) / 10.0 == pytest.approx(0.2 * watts * STEP / 3.6e6 + even, rel=1e-9)
         kept = np.array(problem.stage.kept(state[:8], [*levels, extra[k]], parameters[k])).ravel()
-        assert bool((kept[-2:] <= 1e-12).all()) == bool(max(levels) <= runs + 1e-12)
-        np.testing.assert_allclose(model.lost(state, ahead.running[k], np.array(levels)),
-                                   max(ahead.running[k], *levels) * CAPACITY * (SUPPLY - REFERENCE - state[:2]))  # fmt: skip
-        assert model.bought_anyway(ahead.running[k : k + 1], np.array([levels]))[0, 0] == pytest.approx(
-            50.0 + FAN * max(ahead.running[k], *levels)
-        )
+        assert bool((kept[1:3] <= 1e-12).all()) == bool(max(levels) <= runs + 1e-12)
+        assert bool(kept[3] <= 1e-12) == (extra[k] <= sum(levels) + 1e-12)
+        assert problem.running(ahead.running[k : k + 1], np.array([[*levels, extra[k]]]))[0] == pytest.approx(runs)
+        np.testing.assert_allclose(model.lost(state, runs), lost)
+        assert model.bought_anyway(np.array([runs]))[0, 0] == pytest.approx(50.0 + FAN * runs)
 
 
 def test_a_plan_heats_rooms_at_a_time_where_each_would_cool_the_other() -> None:
@@ -201,6 +209,14 @@ def test_a_plan_heats_rooms_at_a_time_where_each_would_cool_the_other() -> None:
     # who knows nothing of the air expects the band to be kept for less, and is wrong by what the rooms lose
     assert plans[None].power[28:, 0].mean() < 0.8 * plans[SUPPLY].power[28:, 0].mean()
     assert plans[SUPPLY].rule is not None and plans[SUPPLY].rule.rule > 0.0
+
+
+def test_a_battery_beside_it_has_its_own_decision() -> None:
+    electric = Electric(Battery(36e6, 5000.0, 0.95, 0.95), "battery/power", "battery/level")
+    problem = IdentifiedProblem(model_of(), electric)
+    decisions = np.full(problem.decisions, 0.5)
+    assert problem.command(decisions).keys() == {"battery/power"}
+    assert problem.running(np.array([0.5]), decisions[None])[0] == 0.75
 
 
 def test_the_observer_takes_its_air_as_measured_else_as_planned() -> None:
@@ -289,3 +305,54 @@ def test_the_rule_is_estimated_with_its_air() -> None:
         costs[supply] = estimate_rule(problem, ahead, parameters, planned, free[1], np.zeros(2, dtype=bool)).rule
     lost = float(CAPACITY.sum()) * (293.15 - SUPPLY) + FAN
     assert costs[SUPPLY] - costs[None] == pytest.approx(0.2 * lost * 48 * STEP / 3.6e6, rel=0.2)
+
+
+def test_a_box_that_has_less_makes_it_run_for_longer() -> None:
+    """Half of the load from a box that has at most that: it runs whole steps, in the plan and in the rule."""
+    model = model_of()
+    problem, most = IdentifiedProblem(model), np.array([0.5, 1.0])
+    ahead = Ahead.of(model, forecast("2023-01-10 00:15", 4, np.full(4, 293.15)), PLACE)
+    state = np.append(np.full(8, 0.0), np.zeros(2))
+    parameters = problem.data(state, ahead, np.zeros((4, 2)), 10.0, (np.zeros((4, 2)), np.tile(most, (4, 1)))).parameters
+    for runs, fits in ((0.6, False), (1.0, True)):  # decisions are shares of what each has
+        kept = np.array(problem.stage.kept(state[:8], [1.0, 0.2, runs], parameters[0])).ravel()
+        assert bool((kept <= 1e-12).all()) == fits
+    assert running(np.zeros(1), np.array([[0.5, 0.2]]), most[None])[0] == 1.0
+    assert running(np.array([0.3]), np.array([[0.1, 0.2]]), most[None])[0] == pytest.approx(0.3)
+
+
+def test_the_rule_keeps_its_edge_where_heat_makes_it_run() -> None:
+    model = model_of()
+    problem = IdentifiedProblem(model)
+    ahead = Ahead.of(model, forecast("2023-01-10 00:15", 48, np.full(48, 293.15)), PLACE)
+    ahead, free = replace(ahead, running=np.zeros(48)), (np.zeros((48, 2)), np.ones((48, 2)))
+    state = np.append(np.full(8, 0.3), np.zeros(2))
+    parameters = problem.data(state, ahead, np.zeros((48, 2)), 10.0, free).parameters
+    states, levels = _rule(problem, ahead, parameters, (state[:8], free[1], np.zeros(2, dtype=bool)))
+    assert levels.max() > 0.2 and states[24:, :2].min() > 293.15 - REFERENCE - 0.15  # that of its thermostats
+
+
+@pytest.mark.parametrize(("missing", "part"), [("discharge", 1), ("flow", 0), ("zone", 2)])
+def test_a_sensor_that_is_missing_teaches_nothing(missing: str, part: int) -> None:
+    """Neither hours nor limits, and no warning; both rooms ask for more than they have."""
+    model = model_of()
+    made, columns = Thermostats(model), tuple(c for m in MACHINES for c in m.air)
+    for k in range(2):
+        made.tell(k, 1.0, 1.0, np.full((4, 2), 293.0), (290.0, 299.0))
+    values = [v for flow in FLOWS for v in (0.5 * flow, SUPPLY + 8.0, 290.0)]
+    values[part] = np.nan
+    stamp = int(pd.Timestamp("2023-01-10 03:15", tz=PLACE.timezone).timestamp())
+    zone = np.array([np.nan if missing == "zone" else 290.0, 290.0])
+    made.learn(Measurements(PointLayout(columns, PLACE.timezone), stamp, values), zone, 265.0)
+    assert made._hours.seen == model.air_handler.hours and (made.most(np.array([265.0])) == 1.0).all()
+    assert np.isinf(made.together(np.array([265.0, 265.0]))).all()
+
+
+def test_flow_that_varies_is_no_air_handler_of_this_kind(telemetry: PlantTelemetry) -> None:
+    rng, frame = np.random.default_rng(0), telemetry.frame.copy()
+    for room in ROOMS:
+        frame[f"{room}/{SUPPLY_FLOW}"] *= rng.uniform(0.4, 1.6, len(frame))
+    assert find_air_handler(replace(telemetry, frame=frame), MACHINES, above_of(telemetry))[0] is None
+    for room in ROOMS:
+        frame[f"{room}/{DISCHARGE_TEMPERATURE}"] = np.nan
+    assert find_air_handler(replace(telemetry, frame=frame), MACHINES, above_of(telemetry))[0] is None

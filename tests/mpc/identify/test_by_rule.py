@@ -51,7 +51,7 @@ def test_the_rule_keeps_the_edge_and_equals_itself(operation: str) -> None:
     air = states[12:, 0] + REFERENCE
     assert 292.9 < air.min() and air.max() < 294.3 and 0.0 < levels.mean() < 1.0
     assert set(levels.ravel()) == {0.0, 1.0} or operation == "setpoint"
-    cost, heat = _bought(problem, ahead, states, levels)
+    cost, heat = _bought(problem, ahead, states, levels, ahead.running)
     assert cost == pytest.approx(0.25 * 0.2 * heat / 3.6e6)  # a quarter of the heat at 0.2 a kilowatt hour
     same = estimate_rule(problem, ahead, parameters, (states, levels), ends[1], np.array([False]))
     assert same.saving == 0.0 and same.plan == same.rule == cost

@@ -74,7 +74,7 @@ def test_a_model_and_its_telemetry_survive_their_files(
         read.frame, known.telemetry.frame, check_freq=False, check_names=False, check_index_type=False
     )
     (tmp_path / "model.json").write_text("{}")
-    with pytest.raises(ControlError, match="format 8, found format None"):
+    with pytest.raises(ControlError, match="format 9, found format None"):
         read_model(tmp_path)
     with pytest.raises(ControlError, match="a folder with model.json"):
         read_model(tmp_path / "none")
