@@ -101,7 +101,7 @@ def _bought(
     problem: IdentifiedProblem, ahead: Ahead, states: FloatArray, levels: FloatArray, runs: FloatArray,
     water: FloatArray | None = None,
 ) -> tuple[float, float]:  # fmt: skip
-    """Cost [currency] and heat [J] of levels along states, as an air handler runs; what is taken where machines cool."""
+    """Cost [currency] and heat [J] of levels along states, as an air handler runs; what is taken by cooling."""
     model = problem.model
     powers = bought(model, ahead.beyond, states[:-1], levels, ahead.outdoor, water).sum(axis=1)
     powers = powers + model.bought_anyway(runs)

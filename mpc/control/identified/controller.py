@@ -204,16 +204,15 @@ class IdentifiedController:
         on[[runs.machine for runs in self._runs]] = [runs.on for runs in self._runs]
         solution = self._decided(ahead)
         decided = None if solution is None else solution.decisions
-        whole = None if decided is None else decided[0]
-        levels = self._by_rule(measurements, ahead) if whole is None else whole[: len(self.model.maps)]
+        levels = self._by_rule(measurements, ahead) if decided is None else decided[0, : len(self.model.maps)]
         source, reasons = ("optimal plan", ()) if solution is not None else ("rules", ("the solver found no plan",))
         for runs in self._runs:
             runs.note(float(levels[runs.machine]))
         planned = replace(ahead, running=self._problem.running(ahead.running, decided))
         self._before, self._plan = (planned, levels), solution
         values = self._values(levels, solution, ahead, measurements)
-        if whole is not None:
-            values |= self._problem.command(whole)
+        if decided is not None:
+            values |= self._problem.command(decided[0])
         if self._meter is not None:
             self._meter.note(levels, values, planned, self._observer.state)
         action = PlannedAction(values, measurements.stamp, source, reasons)
