@@ -13,6 +13,7 @@ from mpc.identify.limits import OUT_OF_REACH
 from mpc.identify.machines import Machine
 from mpc.identify.telemetry import PlantTelemetry
 from mpc.loop.plant import Measurements
+from mpc.scenario.grid import hours_of_week
 from mpc.scenario.scenario import OCCUPANCY_POINT
 from thermal._types import BoolArray, FloatArray
 from thermal.units import AIR_HEAT_CAPACITY
@@ -34,7 +35,7 @@ _IDLE = 0.02
 WHOLE = 0.95
 
 #: Hours of a day.
-DAY = 24
+_DAY = 24
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,19 @@ class AirHandler:
         """
         known = [[measurements[c] if c in measurements else np.nan for c in m.air] for m in machines]
         flow, _, air = np.array(known).T
-        return AIR_HEAT_CAPACITY * flow * (self.supply - air), float(self.share(flow))
+        return self.blown(flow, air), float(self.share(flow))
+
+    def blown(self, flow: FloatArray, air: FloatArray) -> FloatArray:
+        """Heat of its air to the rooms by measured flows, negative as it is cold, shape (..., n_machine) [W].
+
+        Parameters
+        ----------
+        flow : ndarray, shape (..., n_machine)
+            [kg/s].
+        air : ndarray, shape (..., n_machine)
+            Of the rooms [K].
+        """
+        return np.asarray(AIR_HEAT_CAPACITY * flow * (self.supply - air))
 
     def share(self, flow: FloatArray) -> FloatArray:
         """Share of the time that it runs by the flow of its boxes, shape (...) [-]; NaN where one is not known.
@@ -155,8 +168,8 @@ class RunningHours:
             Whether it did.
         """
         self._known[hour] = runs
-        if hour < 5 * DAY:
-            self._usual[hour % DAY] = runs
+        if hour < 5 * _DAY:
+            self._usual[hour % _DAY] = runs
 
     def at(self, hours: np.ndarray, occupied: BoolArray) -> FloatArray:
         """Tell where it runs, shape (n,): 1 or 0 [-].
@@ -170,23 +183,9 @@ class RunningHours:
         """
         found = []
         for hour, people in zip(hours.tolist(), occupied.tolist(), strict=True):
-            usual = self._usual.get(hour % DAY, people) if hour < 5 * DAY else people
+            usual = self._usual.get(hour % _DAY, people) if hour < 5 * _DAY else people
             found.append(float(self._known.get(hour, usual)))
         return np.array(found)
-
-
-def hours_of_week(stamps: pd.DatetimeIndex, step: float) -> np.ndarray:
-    """Hour of the week in which steps begin, local, shape (n,).
-
-    Parameters
-    ----------
-    stamps : DatetimeIndex
-        Ends of the steps.
-    step : float
-        Their length [s].
-    """
-    begin = stamps - pd.Timedelta(seconds=step)
-    return np.asarray(DAY * begin.day_of_week + begin.hour, dtype=int)
 
 
 def find_air_handler(
@@ -238,42 +237,35 @@ def find_air_handler(
     if shown < _SHOWN or supply > float(np.nanmean(air[runs])) - _COLDER:
         return nothing
     made = [replace(m, supply=supply) for m in machines]
-    heat = np.zeros_like(nothing[2])
+    found = AirHandler(supply, tuple(float(AIR_HEAT_CAPACITY * each) for each in usual))
+    heat, blown = np.zeros_like(nothing[2]), found.blown(flow, air)
     for k, zone in enumerate(served):
-        lost = pd.Series(AIR_HEAT_CAPACITY * flow[:, k] * (supply - air[:, k]))
-        heat[:, zones.index(zone)] = telemetry.bridged(lost)
+        heat[:, zones.index(zone)] = telemetry.bridged(pd.Series(blown[:, k]))
     level = np.column_stack([m.level(telemetry) for m in made])
     asked = (level > _IDLE).any(axis=1) | ~(np.nan_to_num(above, nan=np.inf) < -OUT_OF_REACH).all(axis=1)
     of_week, hours = hours_of_week(pd.DatetimeIndex(telemetry.frame.index), telemetry.step), RunningHours()
     for hour, ran in zip(of_week[~asked | ~runs].tolist(), runs[~asked | ~runs].tolist(), strict=True):
         hours.learn(hour, ran)
-    capacities = tuple(float(AIR_HEAT_CAPACITY * each) for each in usual)
-    return AirHandler(supply, capacities, {}, hours.seen), made, heat
+    return replace(found, hours=hours.seen), made, heat
 
 
-def told_by_whole_steps(
-    handler: AirHandler, telemetry: PlantTelemetry, machines: Sequence[Machine], above: FloatArray
-) -> FloatArray:
+def told_by_whole_steps(runs: FloatArray, above: FloatArray) -> FloatArray:
     """Leave out steps of which an air handler ran only a part: what boxes gave then is not all that they have.
 
     Parameters
     ----------
-    handler : AirHandler
-        Found.
-    telemetry : PlantTelemetry
-        Of the plant.
-    machines : sequence of Machine
-        Boxes.
+    runs : ndarray, shape (n_time,)
+        Share of the steps that it runs [-].
     above : ndarray, shape (n_time, n_machine)
         How far setpoints lie above the air of their rooms [K].
     """
-    runs = handler.share(np.column_stack([telemetry.column(m.air[0]) for m in machines]))
     return np.where((runs >= WHOLE)[:, None], above, np.nan)
 
 
 def with_powers(
-    handler: AirHandler, telemetry: PlantTelemetry, machines: Sequence[Machine], bought: Mapping[str, FloatArray]
-) -> tuple[AirHandler, dict[str, FloatArray]]:
+    handler: AirHandler, telemetry: PlantTelemetry, machines: Sequence[Machine], bought: Mapping[str, FloatArray],
+    runs: FloatArray,
+) -> tuple[AirHandler, dict[str, FloatArray]]:  # fmt: skip
     """Find what is bought while an air handler runs, by least squares beside the heat of the boxes, none below zero.
 
     In its own hours it runs anyway: what counts is what it buys in others, where dampers to outdoor air are shut.
@@ -289,6 +281,8 @@ def with_powers(
         Boxes.
     bought : mapping of str to ndarray, shape (n_time,)
         Of each kind [W].
+    runs : ndarray, shape (n_time,)
+        Share of the steps that it runs [-].
 
     Returns
     -------
@@ -297,8 +291,6 @@ def with_powers(
     dict of str to ndarray, shape (n_time,)
         What is bought beyond that [W].
     """
-    flow = np.column_stack([telemetry.column(m.air[0]) for m in machines])
-    runs = handler.share(flow)
     hours = hours_of_week(pd.DatetimeIndex(telemetry.frame.index), telemetry.step)
     people = [telemetry.column(f"{zone}/{OCCUPANCY_POINT}") > 0.0 for zone in telemetry.site.areas]
     free = RunningHours(handler.hours).at(hours, np.any(people, axis=0)) < 0.5

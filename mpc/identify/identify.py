@@ -104,8 +104,9 @@ def identify(telemetry: PlantTelemetry, machines: Sequence[Machine], progress: P
     signals = np.column_stack([machine.signal(telemetry) for machine in machines])
     bought = {name: telemetry.column(name) for name in CARRIERS if name in telemetry.frame}
     if handler is not None:
-        handler, bought = with_powers(handler, telemetry, machines, bought)
-        above = told_by_whole_steps(handler, telemetry, machines, above)
+        runs = handler.share(np.column_stack([telemetry.column(machine.air[0]) for machine in machines]))
+        handler, bought = with_powers(handler, telemetry, machines, bought, runs)
+        above = told_by_whole_steps(runs, above)
     own = [telemetry.column(m.power) if m.power and m.meter else None for m in machines]
     per_day = round(86_400.0 / telemetry.step)
     course = WaterCourse.of(telemetry, machines)

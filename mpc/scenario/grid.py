@@ -13,7 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from mpc.errors import ScenarioError
-from thermal._types import FloatArray
+from thermal._types import FloatArray, IntArray
 from thermal.case.building import Building
 from thermal.case.case import local_timestamp
 from thermal.case.years import EXPECTED, FIRST_YEAR, LAST_YEAR, shown, within_years
@@ -290,3 +290,17 @@ def means_of_steps(source: FloatArray, values: FloatArray, edges: FloatArray) ->
     k = np.clip(np.searchsorted(source, edges, side="right") - 1, 0, len(values) - 1)
     integral = total[k] + (values[k].T * (edges - source[k])).T
     return np.asarray((np.diff(integral, axis=0).T / np.diff(edges)).T)
+
+
+def hours_of_week(stamps: pd.DatetimeIndex, step: float) -> IntArray:
+    """Hours since Monday, 0 to 167, in which steps begin that end at the stamps, shape (n,).
+
+    Parameters
+    ----------
+    stamps : DatetimeIndex, shape (n,)
+        Local.
+    step : float
+        Length of the steps [s].
+    """
+    begins = stamps - pd.Timedelta(seconds=step)
+    return np.asarray(begins.day_of_week * 24 + begins.hour)

@@ -8,6 +8,8 @@ import numpy as np
 import pandas as pd
 
 from mpc.errors import VerificationError
+from mpc.scenario.grid import hours_of_week
+from mpc.scenario.rates import HOUR
 from mpc.verification.inference import lag_one
 from thermal._types import FloatArray, IntArray
 
@@ -216,22 +218,15 @@ def _daily_columns(
             yield name, table[name].to_numpy(dtype=float)
 
 
-def hour_of_week(table: pd.DataFrame) -> IntArray:
-    """Hours since Monday, 0 to 167, of hours that end at the stamps, shape (n_hour,).
-
-    Parameters
-    ----------
-    table : DataFrame
-        By hour.
-    """
-    begins = pd.DatetimeIndex(table.index) - pd.Timedelta(hours=1)
-    return np.asarray(begins.day_of_week * 24 + begins.hour)
+def _hours_of(table: pd.DataFrame) -> IntArray:
+    """Hours of the week of a table by hour."""
+    return hours_of_week(pd.DatetimeIndex(table.index), HOUR)
 
 
 def _fit_hourly(table: pd.DataFrame) -> BaselineModel:
     weeks = len(table) / 168.0
     VerificationError.unless(weeks >= 4.0, "baseline", "4 weeks of hours", f"{weeks:.1f}", "use --model change-point")
-    outdoor, power, hour = table["outdoor"].to_numpy(), table["power"].to_numpy(), hour_of_week(table)
+    outdoor, power, hour = table["outdoor"].to_numpy(), table["power"].to_numpy(), _hours_of(table)
     rough = np.column_stack(
         [np.ones(len(table)), np.maximum(_HEATS_BELOW - outdoor, 0.0), np.maximum(outdoor - _COOLS_ABOVE, 0.0)]
     )
@@ -248,7 +243,7 @@ def _fit_hourly(table: pd.DataFrame) -> BaselineModel:
 
 
 def _hourly_design(table: pd.DataFrame, occupied: frozenset[int], knots: FloatArray) -> FloatArray:
-    hour, outdoor = hour_of_week(table), table["outdoor"].to_numpy()
+    hour, outdoor = _hours_of(table), table["outdoor"].to_numpy()
     of_week = (hour[:, None] == np.arange(168)).astype(float)
     low, high = knots[:-1].copy(), knots[1:].copy()
     low[0], high[-1] = -np.inf, np.inf  # beyond the ends the first and the last line go on

@@ -8,11 +8,11 @@ import numpy as np
 import pandas as pd
 
 from mpc.control.identified.beyond import WEIGHTS
-from mpc.identify.air_handler import hours_of_week
 from mpc.identify.machines import as_heated
 from mpc.identify.model import PlantModel
 from mpc.identify.telemetry import CARRIERS, facade_sun
 from mpc.scenario.forecast import Forecast
+from mpc.scenario.grid import hours_of_week
 from thermal._types import FloatArray
 from thermal.case.building import Location
 from thermal.case.points import OUTDOOR_TEMPERATURE

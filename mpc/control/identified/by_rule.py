@@ -70,23 +70,25 @@ def _rule(
     state, most, runs = start[0], start[1], start[2].astype(bool).copy()
     states, levels = np.empty((count + 1, state.size)), np.zeros((count, len(served)))
     states[0] = state
+    led = np.array([found.operation == "setpoint" for found in model.maps], dtype=bool)
+    idle, full = np.array([found.above for found in model.maps]).reshape(m, 2).T
+    # kelvins of a machine's own zones at the end of a step for a watt
+    by_watt = np.array([heated[: len(zones)][mine, k].mean() for k, mine in enumerate(served)])
     for n in range(count):
         edges = kept[n : n + near].max(axis=0)
+        edge = np.array([edges[mine].max() for mine in served])
         free, emitter = transition @ state + exogenous[n], model.box.emitter(state)
+        for k in np.flatnonzero(~led):
+            above = float(state[: len(zones)][served[k]].min()) - edge[k]
+            runs[k] = above < 0.0 or (runs[k] and above <= DIFFERENCE)
+            levels[n, k] = most[n, k] * runs[k]
+        most_heat = np.array([problem.heat(k, 1.0, ahead.outdoor[n], emitter[k]) for k in range(m)])
+        rise = sign * by_watt * most_heat + full - idle
         for _ in range(1 if model.air_handler is None else _SIZED):  # an air handler runs for what boxes ask for
             rest = free + blown @ model.lost(state, float(running(ahead.running[n], levels[n], most[n])))
-            for k, (found, mine) in enumerate(zip(model.maps, served, strict=True)):
-                edge = float(edges[mine].max())
-                if found.operation == "setpoint":
-                    gained = sign * heated[:, k] * problem.heat(k, 1.0, ahead.outdoor[n], emitter[k])
-                    idle, wide = found.above[0], found.above[1] - found.above[0]
-                    rise = float(gained[: len(zones)][mine].mean()) + wide
-                    missing = edge - idle - sign * float(rest[: len(zones)][mine].mean())
-                    levels[n, k] = np.clip(missing / rise, 0.0, most[n, k]) if rise > 0.0 else 0.0
-                    continue
-                above = float(state[: len(zones)][mine].min()) - edge
-                runs[k] = above < 0.0 or (runs[k] and above <= DIFFERENCE)
-                levels[n, k] = most[n, k] * runs[k]
+            missing = edge - idle - sign * model.air(rest[: len(zones)])
+            asked = np.clip(np.divide(missing, rise, out=np.zeros(m), where=rise > 0.0), 0.0, most[n])
+            levels[n, led] = asked[led]
         shared = float(shares @ levels[n])
         if shared > ahead.together[n]:
             levels[n, shares > 0.0] *= ahead.together[n] / shared

@@ -10,13 +10,14 @@ import pandas as pd
 from calibration.estimation.state_space import REFERENCE
 from mpc.control.identified.ahead import Ahead
 from mpc.control.identified.forecast_error import ForecastError
-from mpc.identify.air_handler import WHOLE, RunningHours, hours_of_week
+from mpc.identify.air_handler import WHOLE, RunningHours
 from mpc.identify.limits import OUT_OF_REACH, HeatLimit
 from mpc.identify.machines import as_heated, pairs_as_heated
 from mpc.identify.model import PlantModel
 from mpc.identify.shared import SharedLimit, out_of_reach
 from mpc.identify.water import LATELY
 from mpc.loop.plant import Measurements
+from mpc.scenario.grid import hours_of_week
 from thermal._types import BoolArray, FloatArray
 
 #: A load below this is none [-], and one nearer than it to the largest is all.

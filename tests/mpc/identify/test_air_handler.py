@@ -21,7 +21,6 @@ from mpc.identify.air_handler import (
     AirHandler,
     RunningHours,
     find_air_handler,
-    hours_of_week,
     running,
     told_by_whole_steps,
 )
@@ -34,6 +33,7 @@ from mpc.identify.telemetry import SET, PlantTelemetry, Site
 from mpc.loop.actuators import HEATING_SETPOINT, Actuator
 from mpc.loop.plant import Measurements, PointLayout
 from mpc.scenario.forecast import Forecast
+from mpc.scenario.grid import hours_of_week
 from thermal._types import FloatArray
 from thermal.case.building import Location
 from thermal.case.points import DISCHARGE_TEMPERATURE, OUTDOOR_TEMPERATURE, SUPPLY_FLOW, ZONE_TEMPERATURE
@@ -275,7 +275,8 @@ def test_what_boxes_have_is_told_by_whole_steps_alone(share: float, learns: bool
 def test_limits_are_read_from_whole_steps(telemetry: PlantTelemetry) -> None:
     found, machines, _ = find_air_handler(telemetry, MACHINES, above_of(telemetry))
     assert found is not None
-    told = told_by_whole_steps(found, telemetry, machines, above_of(telemetry))
+    flow = np.column_stack([telemetry.column(m.air[0]) for m in machines])
+    told = told_by_whole_steps(found.share(flow), above_of(telemetry))
     part = telemetry.frame[f"north/{SUPPLY_FLOW}"].to_numpy() < 0.95 * FLOWS[0]
     assert np.isnan(told[part]).all() and np.isfinite(told[~part]).all() and 10 < part.sum() < part.size / 2
 
