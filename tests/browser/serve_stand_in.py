@@ -42,7 +42,7 @@ def diagnose(case: Path, out: Path, progress: Progress, units: str) -> None:
     """Take a moment, and write a page at the end."""
     for done in range(20):
         progress("fitting", done, 20)
-        time.sleep(0.02)
+        time.sleep(0.1)
     out.mkdir(parents=True, exist_ok=True)
     (out / "diagnosis.json").write_text("{}", encoding="utf-8")
     (out / "report.html").write_text(f'<p class="verdict">It fits, in {units}.</p>', encoding="utf-8")

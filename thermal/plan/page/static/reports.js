@@ -54,24 +54,41 @@ async function refresh() {
   }
 }
 
+// What is as it was stays in place: a button that is replaced while it is pressed loses the press.
 function draw(reports) {
   const body = byId("reports-body"), errors = page.findings.some((f) => f.level === "error");
   if (!body) return;
-  const cards = page.reports.map((kind) => {
-    const [title, text] = WORDS[kind] || [kind, ""], job = jobs.get(kind);
-    return el("section", { class: "card" }, el("h3", {}, title), el("p", { class: "soft" }, text),
-      job ? el("div", { class: "working", id: `job-${kind}` }, el("p", { role: "status", "aria-live": "polite" }, words(job.state)), el("progress", job.state.total ? { max: job.state.total, value: job.state.done } : {}), el("button", { type: "button", onclick: () => job.stop.abort() }, "Stop"))
-        : el("button", { type: "button", class: "primary", id: `make-${kind}`, disabled: errors || !page.written || (kind !== "check" && !page.telemetry), onclick: () => make(kind) }, `${title} now`));
-  });
+  if (!byId("reports-list")) body.replaceChildren(el("div", { id: "reports-message" }), el("div", { class: "cards" }, page.reports.map((kind) => el("section", { class: "card", id: `card-${kind}` }))), el("div", { id: "reports-list" }));
+  const message = errors ? "Reports can be made as soon as the case is valid." : page.telemetry ? "" : "The case has no telemetry yet: check works, calibrate and diagnose wait for it (button Telemetry).";
+  put(byId("reports-message"), [errors, message], () => (message ? [el("p", { class: errors ? "message" : "soft" }, message)] : []));
+  for (const kind of page.reports) {
+    const job = jobs.get(kind), disabled = errors || !page.written || (kind !== "check" && !page.telemetry);
+    put(byId(`card-${kind}`), [job?.state.number, disabled], () => card(kind, job, disabled));
+  }
+  put(byId("reports-list"), [reports, units.chosen()], () => list(reports));
+}
+
+// Fill a place anew where what it is made of has changed.
+function put(place, made, children) {
+  const told = JSON.stringify(made);
+  if (place.dataset.made === told) return;
+  place.dataset.made = told;
+  place.replaceChildren(...children());
+}
+
+function card(kind, job, disabled) {
+  const [title, text] = WORDS[kind] || [kind, ""];
+  return [el("h3", {}, title), el("p", { class: "soft" }, text),
+    job ? el("div", { class: "working", id: `job-${kind}` }, el("p", { role: "status", "aria-live": "polite" }, words(job.state)), el("progress", job.state.total ? { max: job.state.total, value: job.state.done } : {}), el("button", { type: "button", onclick: () => job.stop.abort() }, "Stop"))
+      : el("button", { type: "button", class: "primary", id: `make-${kind}`, disabled, onclick: () => make(kind) }, `${title} now`)];
+}
+
+function list(reports) {
+  if (!reports.length) return [el("p", { class: "soft" }, "No reports yet. Those of results folders inside the case, or given with --results, are listed here.")];
   const rows = reports.map((report) => el("tr", {},
     el("td", {}, el("a", { href: api.address(`reports/${report.key}/report.html`), target: "_blank", rel: "noopener" }, capital(report.kind === "other" ? report.title : report.kind))),
     el("td", { class: "found" }, units.told(report.verdict)), el("td", { class: "soft" }, report.title || "made here"), el("td", { class: "soft" }, moment(report.time))));
-  body.replaceChildren(
-    errors ? el("p", { class: "message" }, "Reports can be made as soon as the case is valid.") : !page.telemetry ? el("p", { class: "soft" }, "The case has no telemetry yet: check works, calibrate and diagnose wait for it (button Telemetry).") : "",
-    el("div", { class: "cards" }, cards),
-    reports.length ? el("table", {}, el("caption", {}, "Reports of this case"), el("thead", {}, el("tr", {}, ["Report", "What it found", "Folder", "Written"].map((h) => el("th", { scope: "col" }, h)))), el("tbody", {}, rows))
-      : el("p", { class: "soft" }, "No reports yet. Those of results folders inside the case, or given with --results, are listed here."),
-  );
+  return [el("table", {}, el("caption", {}, "Reports of this case"), el("thead", {}, el("tr", {}, ["Report", "What it found", "Folder", "Written"].map((h) => el("th", { scope: "col" }, h)))), el("tbody", {}, rows))];
 }
 
 const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
