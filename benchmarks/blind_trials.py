@@ -38,6 +38,7 @@ from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from pathlib import Path
 
+from _sealed import EnergyPlusMissingError, TrialError
 from _seeds import seed_range
 from _trial_answers import CASES, SEALED, answer_all, measure_gaps, report
 from _trial_worlds import report_worlds
@@ -71,9 +72,9 @@ def make(maker: World, specs: Sequence[Drawn], out: Path, workers: int) -> list[
                 spec, outcome = tasks[task], "there already"
                 try:
                     outcome = "made" if task.result() else outcome
-                except maker.MISSING as error:
+                except EnergyPlusMissingError as error:
                     raise SystemExit(str(error)) from error
-                except maker.FAILED as error:  # the others are worth having
+                except TrialError as error:  # the others are worth having
                     failed.append(spec.name)
                     outcome = f"FAILED: {error}"
                 seconds = time.perf_counter() - began
@@ -86,9 +87,9 @@ def make(maker: World, specs: Sequence[Drawn], out: Path, workers: int) -> list[
 
 def _make(options: argparse.Namespace) -> int:
     maker = world(options.world)
-    kinds = tuple(k for k in maker.KINDS if k != "without") if options.kind == "all" else (options.kind,)
-    if not set(kinds) <= set(maker.KINDS):
-        raise SystemExit(f"--kind: expected one of {', '.join(maker.KINDS)} of the world {options.world!r}, "
+    kinds = tuple(k for k in maker.kinds if k != "without") if options.kind == "all" else (options.kind,)
+    if not set(kinds) <= set(maker.kinds):
+        raise SystemExit(f"--kind: expected one of {', '.join(maker.kinds)} of the world {options.world!r}, "
                          f"found {options.kind!r}")  # fmt: skip
     if options.uneven and options.world != "office":
         raise SystemExit(f"--uneven: expected the world 'office', found {options.world!r}; leave it out")
@@ -97,7 +98,7 @@ def _make(options: argparse.Namespace) -> int:
         spec
         for seed in options.seeds
         for kind in kinds
-        for spec in maker.draw(seed, kind, confirmation=options.confirmation, days=options.days or maker.DAYS, **more)
+        for spec in maker.draw(seed, kind, confirmation=options.confirmation, days=options.days, **more)
     ]
     return 1 if make(maker, specs, options.out, options.workers) else 0
 

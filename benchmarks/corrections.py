@@ -29,14 +29,14 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from _sealed import TrialError
 from _seeds import seed_range
 from _table import markdown, publish, write
 from _trial_scores import LEAST_GAP
 from energyplus_trials.climate import YEAR
 from energyplus_trials.drawing import draw_spec
-from energyplus_trials.errors import TrialError
 from energyplus_trials.specification import TrialSpec
-from energyplus_trials.trial import make_trial
+from energyplus_trials.world import WORLD
 
 from calibration.diagnosis.correction import correct
 from calibration.diagnosis.refit.comparison import Fit, ModelComparison
@@ -228,8 +228,8 @@ def _answer(out: Path, spec: TrialSpec, file: Path) -> str:
         return "there already"
     try:
         for trial in (spec, spec.twin()):
-            make_trial(trial, out / "cases", out / "sealed")
-            make_trial(later(trial), out / "later" / "cases", out / "later" / "sealed")
+            WORLD.make(trial, out / "cases", out / "sealed")
+            WORLD.make(later(trial), out / "later" / "cases", out / "later" / "sealed")
     except TrialError as error:  # the others are worth having
         return f"FAILED: {error}"
     row = judge(out, spec.name, spec.twin().name, spec.effects[0].name)

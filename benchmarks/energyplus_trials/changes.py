@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from _worlds import Effect
+
 from energyplus_trials import envelope, inside
 from energyplus_trials.plant import Plant
-from energyplus_trials.specification import Effect
 
 CHANGES: dict[str, Callable[[Plant, Effect], None]] = {
     "solar_gain": envelope.solar_gain,

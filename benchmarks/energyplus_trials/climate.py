@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pvlib
+from _sealed import EnergyPlusMissingError
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from energyplus_trials.errors import EnergyPlusMissingError
 from energyplus_trials.sites import GENERATED
 from energyplus_trials.specification import Climate
 from thermal.case.building import Location

@@ -6,9 +6,10 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from _worlds import Effect
 
 from energyplus_trials import plan
-from energyplus_trials.specification import Effect, Kind, TrialSpec
+from energyplus_trials.specification import Kind, TrialSpec
 
 Draw = Callable[[TrialSpec, np.random.Generator, float], Effect]
 STRENGTHS = (0.35, 1.6)  # of what is typical, drawn evenly on the logarithmic scale

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from _sealed import TrialError
+from _worlds import Effect
 
 from energyplus_trials import fabric, model, plan, profiles
-from energyplus_trials.errors import TrialError
 from energyplus_trials.frame import merge, polygon
 from energyplus_trials.plant import Plant
-from energyplus_trials.specification import Effect
 
 _OUTDOOR_FACES = ("AllExteriorWalls", "AllExteriorWindows", "AllExteriorRoofs")
 STRIP = 0.3  # [m], height of the strip of wall that a thermal bridge takes

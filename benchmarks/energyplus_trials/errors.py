@@ -1,12 +1,6 @@
 """What can go wrong while a trial is made."""
 
-
-class TrialError(Exception):
-    """A trial could not be made; the message says what and where."""
-
-
-class EnergyPlusMissingError(TrialError):
-    """EnergyPlus is not installed."""
+from _sealed import TrialError
 
 
 class EnergyPlusRunError(TrialError):

@@ -7,11 +7,11 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 import pvlib
+from _worlds import Effect
 from scipy.signal import lfilter
 
 from energyplus_trials import climate, model
 from energyplus_trials.readings import Readings
-from energyplus_trials.specification import Effect
 
 
 def apply_faults(readings: Readings) -> None:

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from _worlds import Effect
 
 from energyplus_trials import fabric, model, profiles
 from energyplus_trials.draw_effects import outer_zones
 from energyplus_trials.frame import merge
 from energyplus_trials.plant import Plant
-from energyplus_trials.specification import Effect
 
 HIDDEN_MASS_THICKNESS = 0.1  # [m] of concrete, of which each face has half
 

@@ -1,12 +1,8 @@
-"""Runs a trial's building in EnergyPlus, in a process of its own, and checks how the run ended."""
+"""What EnergyPlus gets of a trial's building, and what a run gives."""
 
 from __future__ import annotations
 
-import json
-import os
 import re
-import subprocess
-import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -18,8 +14,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from energyplus_trials import climate, model
-from energyplus_trials.errors import EnergyPlusMissingError, EnergyPlusRunError
+from energyplus_trials.errors import EnergyPlusRunError
 from energyplus_trials.frame import SITE_OUTPUTS, Objects, constant
+from energyplus_trials.process import DRIVE, WEATHER, run_worker
 from energyplus_trials.specification import TrialSpec
 
 RUN_IN_DAYS = 10
@@ -115,8 +112,8 @@ def simulate(plant: Plant, audit: Sequence[Variable] = ()) -> pd.DataFrame:
 
     Raises
     ------
-    EnergyPlusMissingError, EnergyPlusRunError
-        Not installed; stopped, severe errors, or steps without values.
+    EnergyPlusRunError
+        Stopped, severe errors, or steps without values.
     """
     variables = [("site", ours, name, "Environment") for ours, name in SITE_OUTPUTS.items()]
     for zone in plant.spec.zone_names:
@@ -138,44 +135,10 @@ def _run(
     folder: Path, plant: Plant, weather: pd.DataFrame, variables: Sequence[Variable]
 ) -> tuple[NDArray[np.float64], list[str]]:
     """Return the values, shape (n_time, n_variable), and what EnergyPlus warned of."""
-    climate.write_epw(folder / "in.epw", weather, plant.spec.climate)
-    (folder / "in.epJSON").write_text(json.dumps(plant.objects), encoding="utf-8")
+    climate.write_epw(folder / WEATHER, weather, plant.spec.climate)
     drive = np.column_stack(list(plant.drive.values()))
-    np.savez(folder / "drive.npz", names=np.array(list(plant.drive)), values=drive)
-    job = {
-        "input": str(folder / "in.epJSON"),
-        "weather": str(folder / "in.epw"),
-        "out": str(folder / "out"),
-        "drive": str(folder / "drive.npz"),
-        "result": str(folder / "result.npy"),
-        "laws": plant.laws,
-        "variables": variables,
-        "rows": len(weather),
-        "first_day": int(plant.starts[0].day_of_year),
-    }
-    (folder / "job.json").write_text(json.dumps(job), encoding="utf-8")
-    environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-    done = subprocess.run(
-        [sys.executable, str(_WORKER), str(folder / "job.json")], env=environment, capture_output=True, text=True
-    )
-    if "No module named 'pyenergyplus'" in done.stderr:
-        raise EnergyPlusMissingError("EnergyPlus is not installed: pip install -e .[energyplus]")
-    warnings = _check_end(folder / "out", done, plant.spec)
-    return np.load(folder / "result.npy"), warnings
-
-
-def _check_end(out: Path, done: subprocess.CompletedProcess[str], spec: TrialSpec) -> list[str]:
-    """Refuse a run that did not end well; return what it warned of, beside what is said of every such building."""
-    end, log = (
-        (out / name).read_text(encoding="utf-8", errors="replace") if (out / name).exists() else ""
-        for name in ("eplusout.end", "eplusout.err")
-    )
-    severe = re.search(r"(\d+) Severe Errors", end)
-    if done.returncode != 0 or "Completed Successfully" not in end or severe is None or int(severe[1]) != 0:
-        said = "\n".join(line for line in log.splitlines() if "Severe" in line or "Fatal" in line or "~~~" in line)
-        raise EnergyPlusRunError(
-            f"{spec.name}: expected a run without severe errors, EnergyPlus returned {done.returncode}: "
-            f"{end.strip() or 'no end file'}\n{said[:3000]}\n{done.stderr[-2000:]}"
-        )
-    warnings = [part[2].strip() for part in (line.partition("** Warning **") for line in log.splitlines()) if part[1]]
-    return [warning for warning in warnings if not _EXPECTED.search(warning)]
+    np.savez(folder / DRIVE, names=np.array(list(plant.drive)), values=drive)
+    job = {"result": str(folder / "result.npy"), "laws": plant.laws, "variables": variables, "rows": len(weather),
+           "first_day": int(plant.starts[0].day_of_year)}  # fmt: skip
+    warnings = run_worker(folder, _WORKER, plant.objects, job, plant.spec.name)
+    return np.load(folder / "result.npy"), [warning for warning in warnings if not _EXPECTED.search(warning)]

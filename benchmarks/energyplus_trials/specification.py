@@ -5,10 +5,11 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
-from typing import Any, Literal
+from dataclasses import asdict, dataclass, replace
+from typing import Literal
 
 import numpy as np
+from _worlds import Effect
 
 Kind = Literal["null", "single", "pair", "outside", "without"]
 KINDS: tuple[Kind, ...] = ("null", "single", "pair", "outside")
@@ -168,37 +169,6 @@ class Use:
     outdoor_noise: float
     flow_noise: float
     idle_discharge: str
-
-
-@dataclass(frozen=True)
-class Effect:
-    """One effect that the building holds.
-
-    Parameters
-    ----------
-    name : str
-        Id of the catalogue, or a name of its own outside of it.
-    form : str
-        Parametric form.
-    strength : float
-        Of what is typical, 1 [-].
-    zones : tuple of str
-        Zones that have it; empty for the whole building.
-    parameters : dict
-        Numbers that the form needs, strength applied; names end in their unit.
-    answers : tuple of str
-        Names that count as right.
-    unexplained_is_right : bool
-        Whether `unexplained` counts as right, too: for an effect or a form that the catalogue does not know.
-    """
-
-    name: str
-    form: str
-    strength: float
-    zones: tuple[str, ...] = ()
-    parameters: Mapping[str, Any] = field(default_factory=dict)
-    answers: tuple[str, ...] = ()
-    unexplained_is_right: bool = False
 
 
 @dataclass(frozen=True)

@@ -2,51 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from _worlds import World
 
-from energyplus_trials import specification
 from energyplus_trials.drawing import DAYS, draw_spec, without
-from energyplus_trials.errors import EnergyPlusMissingError, TrialError
-from energyplus_trials.specification import Kind, TrialSpec
-from energyplus_trials.trial import make_trial
+from energyplus_trials.specification import KINDS
+from energyplus_trials.trial import run_trial
 
-__all__ = ["DAYS", "FAILED", "KINDS", "MISSING", "draw", "make"]
-
-KINDS: tuple[Kind, ...] = (*specification.KINDS, "without")
-FAILED, MISSING = TrialError, EnergyPlusMissingError
-
-
-def draw(
-    seed: int, kind: Kind, *, confirmation: bool = False, days: int = DAYS, uneven: bool = False
-) -> list[TrialSpec]:
-    """Draw the trial of a seed and kind, or the twins of its pair less one effect.
-
-    Parameters
-    ----------
-    seed : int
-        Number of the trial in its stream, at least 0.
-    kind : str
-        One of `KINDS`.
-    confirmation : bool
-        Draw from the stream that nothing is tuned on.
-    days : int
-        Length of the telemetry [d].
-    uneven : bool
-        Films and furniture as in other makers' offices.
-    """
-    drawn = "pair" if kind == "without" else kind
-    spec = draw_spec(seed, drawn, confirmation=confirmation, days=days, uneven=uneven)
-    return list(without(spec)) if kind == "without" else [spec]
-
-
-def make(spec: TrialSpec, cases: Path, sealed: Path) -> bool:
-    """Make a trial unless it is there; returns whether it was made.
-
-    Parameters
-    ----------
-    spec : TrialSpec
-        The trial.
-    cases, sealed : Path
-        Folders of what the diagnosis gets, and of the labels.
-    """
-    return make_trial(spec, cases, sealed)
+WORLD = World(KINDS, DAYS, draw_spec, run_trial, without)

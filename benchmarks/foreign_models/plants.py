@@ -12,12 +12,14 @@ from typing import Any
 import yaml
 from energyplus_trials.frame import STEPS_PER_HOUR
 
-from foreign_models import flats, house, office, shop, vav_floor
+from foreign_models import flats, house, office, shop
 from foreign_models.drawn import drawn_plants
 from foreign_models.foreign_plant import ForeignPlant
 from foreign_models.heat_pump import Chiller
 from foreign_models.periods import DAYS, WARM_UP
 from foreign_models.prices import dynamic_prices
+from foreign_models.vav_boxes import FLOOR, SCHOOL
+from foreign_models.vav_boxes import WEATHER as CHICAGO
 from mpc.adapters.energyplus.input import weather_path
 from mpc.scenario.weather_files import read_epw
 
@@ -44,9 +46,15 @@ PLANTS = {
     "shop": ForeignPlant("Shop of 216 m2 with a unitary heat pump of 24 kW", shop.shop, shop.description),
     "vav_floor": ForeignPlant(
         "Storey of 1661 m2 of the Medium Office, five VAV boxes with electric reheat, air handler with a gas furnace",
-        vav_floor.vav_floor,
-        vav_floor.description,
-        vav_floor.WEATHER,
+        FLOOR.model,
+        FLOOR.description,
+        CHICAGO,
+    ),
+    "vav_school": ForeignPlant(
+        "Wing of 1344 m2 of the Primary School, five VAV boxes and their air handler on hot water",
+        SCHOOL.model,
+        SCHOOL.description,
+        CHICAGO,
     ),
     "cooled_shop": ForeignPlant(
         "The same shop in summer", partial(shop.shop, SUMMER), partial(shop.description, SUMMER), cooled=True

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from _worlds import Effect
 from energyplus_trials.frame import merge, polygon
-from energyplus_trials.specification import Effect
 
 from house_trials import fabric, model, people
 from house_trials.faces import STRUCTURE, faces, upright

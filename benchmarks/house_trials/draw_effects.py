@@ -6,7 +6,8 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from energyplus_trials.specification import Effect, Kind
+from _worlds import Effect
+from energyplus_trials.specification import Kind
 
 from house_trials.faces import faces
 from house_trials.specification import HouseSpec

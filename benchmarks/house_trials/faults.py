@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 import pvlib
+from _worlds import Effect
 from energyplus_trials import climate
-from energyplus_trials.specification import Effect
 from scipy.signal import lfilter
 
 from house_trials.readings import Readings

@@ -1,12 +1,8 @@
-"""Runs a trial's house in EnergyPlus, in a process of its own, and checks how the run ended."""
+"""What EnergyPlus gets of a trial's house, and what a run gives."""
 
 from __future__ import annotations
 
-import json
-import os
 import re
-import subprocess
-import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -16,8 +12,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from energyplus_trials import climate
-from energyplus_trials.errors import EnergyPlusMissingError, EnergyPlusRunError
+from energyplus_trials.errors import EnergyPlusRunError
 from energyplus_trials.frame import SITE_OUTPUTS, Objects, constant
+from energyplus_trials.process import DRIVE, WEATHER, run_worker
 
 from house_trials import model
 from house_trials.draw_effects import heated
@@ -182,8 +179,8 @@ def simulate(plant: Plant, audit: Sequence[Variable] = ()) -> Results:
 
     Raises
     ------
-    EnergyPlusMissingError, EnergyPlusRunError
-        Not installed; stopped, severe errors, or steps without values.
+    EnergyPlusRunError
+        Stopped, severe errors, or steps without values.
     """
     rooms = plant.spec.zone_names
     variables: list[Variable] = [(room, ours, name, room) for room in rooms for ours, name in OUTPUTS.items()]
@@ -208,42 +205,14 @@ def simulate(plant: Plant, audit: Sequence[Variable] = ()) -> Results:
 def _run(folder: Path, plant: Plant, variables: Sequence[Variable]) -> tuple[Series, Series, list[str]]:
     """Return values, shape (n_time, n_variable), heat, shape (n_time, n_heated, 2), and what EnergyPlus warned of."""
     weather = climate.building_weather(plant.station, sun=plant.sun, sky=plant.sky)
-    climate.write_epw(folder / "in.epw", weather, plant.spec.climate)
-    (folder / "in.epJSON").write_text(json.dumps(plant.objects), encoding="utf-8")
+    climate.write_epw(folder / WEATHER, weather, plant.spec.climate)
     drive = np.column_stack(list(plant.drive.values())) if plant.drive else np.zeros((len(weather), 0))
     rooms = [plant.spec.zone_names.index(room) for room in plant.heaters]
     np.savez(
-        folder / "drive.npz", names=np.array(list(plant.drive)), values=drive, set_points=plant.set_points[:, rooms]
+        folder / DRIVE, names=np.array(list(plant.drive)), values=drive, set_points=plant.set_points[:, rooms]
     )
-    job = {
-        "input": str(folder / "in.epJSON"), "weather": str(folder / "in.epw"), "out": str(folder / "out"),
-        "drive": str(folder / "drive.npz"), "result": str(folder / "result.npz"), "rows": len(weather),
-        "heaters": list(plant.heaters.values()), "variables": variables, "first_day": int(plant.starts[0].day_of_year),
-    }  # fmt: skip
-    (folder / "job.json").write_text(json.dumps(job), encoding="utf-8")
-    environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-    done = subprocess.run(
-        [sys.executable, str(_WORKER), str(folder / "job.json")], env=environment, capture_output=True, text=True
-    )
-    if "No module named 'pyenergyplus'" in done.stderr:
-        raise EnergyPlusMissingError("EnergyPlus is not installed: pip install -e .[energyplus]")
-    warnings = _check_end(folder / "out", done, plant.spec.name)
+    job = {"result": str(folder / "result.npz"), "rows": len(weather), "heaters": list(plant.heaters.values()),
+           "variables": variables, "first_day": int(plant.starts[0].day_of_year)}  # fmt: skip
+    warnings = run_worker(folder, _WORKER, plant.objects, job, plant.spec.name)
     with np.load(folder / "result.npz") as result:
-        return result["values"], result["heat"], warnings
-
-
-def _check_end(out: Path, done: subprocess.CompletedProcess[str], name: str) -> list[str]:
-    """Refuse a run that did not end well; return what it warned of, beside what is said of every such house."""
-    end, log = (
-        (out / file).read_text(encoding="utf-8", errors="replace") if (out / file).exists() else ""
-        for file in ("eplusout.end", "eplusout.err")
-    )
-    severe = re.search(r"(\d+) Severe Errors", end)
-    if done.returncode != 0 or "Completed Successfully" not in end or severe is None or int(severe[1]) != 0:
-        said = "\n".join(line for line in log.splitlines() if "Severe" in line or "Fatal" in line or "~~~" in line)
-        raise EnergyPlusRunError(
-            f"{name}: expected a run without severe errors, EnergyPlus returned {done.returncode}: "
-            f"{end.strip() or 'no end file'}\n{said[:3000]}\n{done.stderr[-2000:]}"
-        )
-    warnings = [part[2].strip() for part in (line.partition("** Warning **") for line in log.splitlines()) if part[1]]
-    return [warning for warning in warnings if not _EXPECTED.search(warning)]
+        return result["values"], result["heat"], [warning for warning in warnings if not _EXPECTED.search(warning)]

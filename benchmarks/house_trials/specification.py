@@ -7,7 +7,8 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 
-from energyplus_trials.specification import Climate, Effect, Kind
+from _worlds import Effect
+from energyplus_trials.specification import Climate, Kind
 
 #: Sides of the plan and the azimuth of their outer face before rotation [deg].
 SIDES: Mapping[str, float] = {"north": 0.0, "east": 90.0, "south": 180.0, "west": 270.0}

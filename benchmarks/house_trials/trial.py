@@ -1,13 +1,12 @@
-"""Makes a trial: draws the weather, runs the house, reads the sensors, writes the case and seals the label."""
+"""Makes a trial: draws the weather, runs the house, reads the sensors."""
 
 from __future__ import annotations
 
 import time
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from _sealed import places, seal
+from _sealed import Made
 from energyplus_trials import climate
 from energyplus_trials.trial import VERSION
 from scipy.signal import lfilter
@@ -20,28 +19,19 @@ from house_trials.people import Series
 from house_trials.specification import HouseSpec
 
 
-def make_trial(spec: HouseSpec, case_folder: Path, sealed_folder: Path) -> bool:
-    """Make a trial unless it is there, and return whether it was made.
+def run_trial(spec: HouseSpec) -> Made:
+    """Run a trial.
 
     Parameters
     ----------
     spec : HouseSpec
         The trial.
-    case_folder : Path
-        Where its case goes, as `case_folder/NAME`: what the diagnosis gets.
-    sealed_folder : Path
-        Where its label goes, as `sealed_folder/NAME.json`; outside of the case folder.
 
     Raises
     ------
-    ValueError
-        The labels would lie within reach of the diagnosis.
     TrialError
         The run failed, or what came out is not what was asked for.
     """
-    case, label = places(spec.name, case_folder, sealed_folder)
-    if case.exists() and label.exists():
-        return False
     began = time.perf_counter()
     house = build(spec)
     results = plant.simulate(house)
@@ -50,10 +40,8 @@ def make_trial(spec: HouseSpec, case_folder: Path, sealed_folder: Path) -> bool:
     apply_faults(reported)
     run = {"energyplus": VERSION, "seconds": round(time.perf_counter() - began, 2), "heat_deviation": deviation,
            "warnings": results.warnings}  # fmt: skip
-    seal(label, folder.label(spec, twin_names(spec), run))
-    if not case.exists():
-        folder.write_case(case, spec, reported.telemetry())
-    return True
+    label = folder.label(spec, twin_names(spec), run)
+    return Made(label, lambda case: folder.write_case(case, spec, reported.telemetry()))
 
 
 def twin_names(spec: HouseSpec) -> list[str]:

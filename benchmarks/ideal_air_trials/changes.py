@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from _worlds import Effect
 
 from ideal_air_trials import fabric, model, operation
 from ideal_air_trials.fabric import PARTY_BLOCK, construction, merge, resistance
 from ideal_air_trials.plan import walls, zone_name
 from ideal_air_trials.plant import Plant, Series
 from ideal_air_trials.settings import ALWAYS
-from ideal_air_trials.specification import OPENINGS, Effect, generator
+from ideal_air_trials.specification import OPENINGS, generator
 from ideal_air_trials.terminals import ideal_air
 
 _ABSORBED = 0.4  # [-], share of what a pane does not let through that it absorbs

@@ -6,9 +6,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from _worlds import Effect
 
 from ideal_air_trials.plan import outer_zones, walls, zone_name
-from ideal_air_trials.specification import Effect, Spec
+from ideal_air_trials.specification import Spec
 
 Draw = Callable[[Spec, np.random.Generator, float], Effect]
 STRENGTHS = (0.35, 1.6)  # of what is typical, drawn evenly

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
+from _worlds import Effect
 from scipy.signal import lfilter
 
-from ideal_air_trials.specification import STEP, Effect, Spec
+from ideal_air_trials.specification import STEP, Spec
 
 if TYPE_CHECKING:
     from ideal_air_trials.plant import Run

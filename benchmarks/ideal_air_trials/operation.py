@@ -6,9 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from _worlds import Effect
 from numpy.typing import NDArray
 
-from ideal_air_trials.specification import STEPS_PER_DAY, STEPS_PER_HOUR, USE, Effect, Spec, generator
+from ideal_air_trials.specification import STEPS_PER_DAY, STEPS_PER_HOUR, USE, Spec, generator
 
 Series = NDArray[np.float64]
 

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from _sealed import TrialError
 from numpy.typing import NDArray
 
 from ideal_air_trials import settings
-from ideal_air_trials.errors import TrialError
 from ideal_air_trials.fabric import Objects
 from ideal_air_trials.operation import Setpoints
 from ideal_air_trials.specification import Spec

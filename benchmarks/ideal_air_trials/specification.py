@@ -5,12 +5,13 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from datetime import date, timedelta
 from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
+from _worlds import Effect
 
 from ideal_air_trials.plan import Layout
 
@@ -121,47 +122,6 @@ class Climate:
     start: str
     warmer: float
     wind_factor: float
-
-
-@dataclass(frozen=True)
-class Effect:
-    """One effect that the building holds.
-
-    Parameters
-    ----------
-    name : str
-        Id of the catalogue, or a name of its own outside of it.
-    form : str
-        Parametric form.
-    strength : float
-        Of what is typical, 1 [-].
-    zones : tuple of str
-        Zones that have it; empty for the whole building.
-    parameters : dict
-        Numbers that the form needs, strength applied; names end in their unit.
-    answers : tuple of str
-        Names that count as right.
-    unexplained_is_right : bool
-        Whether `unexplained` counts as right, too: for an effect that the catalogue does not know.
-    """
-
-    name: str
-    form: str
-    strength: float
-    zones: tuple[str, ...] = ()
-    parameters: Mapping[str, Any] = field(default_factory=dict)
-    answers: tuple[str, ...] = ()
-    unexplained_is_right: bool = False
-
-    def holds(self, zone: str) -> bool:
-        """Tell whether a zone has the effect.
-
-        Parameters
-        ----------
-        zone : str
-            Name in the building.
-        """
-        return not self.zones or zone in self.zones
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
+from _sealed import TrialError
+
 from mpc.adapters.energyplus.input import InputFile, building_path, entity, read_input
-from reference_trials.errors import TrialError
 from thermal.case.building import Airflow
 
 Content = dict[str, dict[str, dict[str, Any]]]

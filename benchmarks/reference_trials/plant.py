@@ -12,6 +12,7 @@ from functools import cache
 
 import numpy as np
 import pandas as pd
+from _sealed import TrialError
 from numpy.typing import NDArray
 
 from mpc.adapters.energyplus.building import zone_table
@@ -19,7 +20,6 @@ from mpc.adapters.energyplus.input import InputFile, weather_path
 from mpc.adapters.energyplus.process import EnergyPlusProcess, Job, run_energyplus
 from mpc.errors import EnergyPlusError
 from reference_trials.buildings import Content, inlets, served, source
-from reference_trials.errors import TrialError
 from reference_trials.specification import RUN_IN_DAYS, WEATHER, YEAR, Spaces, Spec
 from thermal.case.building import ZoneTable
 

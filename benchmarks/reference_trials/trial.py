@@ -1,20 +1,18 @@
-"""Makes a trial: runs the building, reads the sensors, writes the case and seals the label."""
+"""Makes a trial: runs the building, reads the sensors."""
 
 from __future__ import annotations
 
 import time
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from _sealed import places, seal
+from _sealed import Made, TrialError
 
 from mpc.adapters.energyplus.input import entity, weather_path
 from mpc.scenario.weather_files import read_epw
 from reference_trials import effects, plant
 from reference_trials.buildings import airflows, inlets, source
-from reference_trials.errors import TrialError
 from reference_trials.specification import NOISE, Effect, Spec, generator
 from reference_trials.variant import variant
 from thermal.case.building import Building, Device
@@ -33,26 +31,19 @@ BALANCE_TOLERANCE, NOTHING = 0.01, 1e-9
 _TERMS = {"gains": "internal_gains", "outdoor_air": "infiltration", "zones": "zone_mixing"}
 
 
-def make_trial(spec: Spec, cases: Path, sealed: Path) -> bool:
-    """Make a trial unless it is there, and return whether it was made.
+def run_trial(spec: Spec) -> Made:
+    """Run a trial.
 
     Parameters
     ----------
     spec : Spec
         The trial.
-    cases, sealed : Path
-        Folders of what the diagnosis gets, and of the labels; the second outside of the first.
 
     Raises
     ------
-    ValueError
-        The labels would lie within reach of the diagnosis.
     TrialError
         EnergyPlus failed, or what came out is not what was asked for.
     """
-    case, label = places(spec.name, cases, sealed)
-    if case.exists() and label.exists():
-        return False
     began = time.perf_counter()
     building, table = source(spec.building), plant.geometry(spec.building, spec.spaces)
     held = effects.resolve(spec, building, table)
@@ -68,10 +59,7 @@ def make_trial(spec: Spec, cases: Path, sealed: Path) -> bool:
     drawn = Building(spec.name, place, 0.0, table, devices, passes, geometry_quality="surveyed")
     stamped = frame.tz_localize(place.timezone).rename_axis("timestamp")
     told = {"seconds": round(time.perf_counter() - began, 1), **account}
-    seal(label, spec.label(held, told))
-    if not case.exists():
-        save_case(Case(drawn, Telemetry.from_frame(stamped)), case)
-    return True
+    return Made(spec.label(held, told), lambda case: save_case(Case(drawn, Telemetry.from_frame(stamped)), case))
 
 
 def check(spec: Spec, run: plant.Run, held: tuple[Effect, ...]) -> dict[str, Any]:

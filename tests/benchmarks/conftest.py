@@ -20,7 +20,8 @@ def package(script: Callable[[str], ModuleType]) -> Callable[[str], ModuleType]:
     """Load a module of a package that lies beside the scripts, such as `energyplus_trials.plan`."""
 
     def load(name: str) -> ModuleType:
-        script("_sealed")  # the makers seal their labels by it
+        for shared in ("_sealed", "_worlds"):  # what all makers have
+            script(shared)
         top = name.partition(".")[0]
         if top not in sys.modules:
             places = [str(SCRIPTS / top)]

@@ -59,14 +59,14 @@ def test_seeds_are_a_range(command):
 def test_labels_are_not_put_where_the_diagnosis_looks(trials, small, tmp_path):
     for sealed in (tmp_path / "cases", tmp_path / "cases" / "sealed"):
         with pytest.raises(ValueError, match="outside of the cases"):
-            trials("trial").make_trial(small, tmp_path / "cases", sealed)
+            trials("world").WORLD.make(small, tmp_path / "cases", sealed)
 
 
 def test_a_trial_that_is_there_is_left_alone(trials, small, script, tmp_path):
     case, label = script("_sealed").places(small.name, tmp_path / "cases", tmp_path / "sealed")
     case.mkdir(parents=True)
     script("_sealed").seal(label, {})
-    assert not trials("trial").make_trial(small, tmp_path / "cases", tmp_path / "sealed")
+    assert not trials("world").WORLD.make(small, tmp_path / "cases", tmp_path / "sealed")
 
 
 def test_the_label_holds_the_whole_truth(trials, small, script, tmp_path):
@@ -118,7 +118,7 @@ def test_a_trial_is_a_case_that_tells_nothing(trials, command, small, tmp_path):
         assert not [name for name in effects.CATALOGUE | effects.OUTSIDE if name.encode() in found]
     label = json.loads((tmp_path / "sealed" / f"{spec.name}.json").read_text())
     assert label["run"]["warnings"] == [] and label["run"]["heat_deviation"] < 1e-3
-    assert not trials("trial").make_trial(spec, tmp_path / "cases", tmp_path / "sealed")
+    assert not trials("world").WORLD.make(spec, tmp_path / "cases", tmp_path / "sealed")
 
 
 @pytest.mark.energyplus

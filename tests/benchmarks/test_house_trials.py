@@ -320,7 +320,7 @@ def test_a_case_loads_and_tells_nothing(trials, null, tmp_path, meter):
 
 def test_labels_are_not_put_where_the_diagnosis_looks(trials, null, tmp_path):
     with pytest.raises(ValueError, match="outside of the cases"):
-        trials("trial").make_trial(null, tmp_path / "cases", tmp_path / "cases" / "sealed")
+        trials("world").WORLD.make(null, tmp_path / "cases", tmp_path / "cases" / "sealed")
 
 
 def test_heat_that_is_not_what_was_given_is_refused(trials, null, package):
@@ -359,7 +359,7 @@ def test_heat_balances_room_by_room_in_energyplus(trials, null, emitter):
 def test_a_trial_is_made_once(trials, null, tmp_path):
     spec = with_effect(trials, null, "window_opening")
     cases, sealed = tmp_path / "cases", tmp_path / "sealed"
-    assert trials("trial").make_trial(spec, cases, sealed) and not trials("trial").make_trial(spec, cases, sealed)
+    assert trials("world").WORLD.make(spec, cases, sealed) and not trials("world").WORLD.make(spec, cases, sealed)
     label = json.loads((sealed / f"{spec.name}.json").read_text())
     assert label["run"]["warnings"] == [] and label["run"]["heat_deviation"] < 1e-9
     folder: Path = cases / spec.name

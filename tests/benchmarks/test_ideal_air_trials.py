@@ -341,7 +341,7 @@ def test_air_balances_and_nothing_else_heats_it_in_energyplus(trials, null):
 @pytest.mark.energyplus
 @needs_energyplus
 def test_a_trial_is_the_same_twice_and_tells_nothing(trials, draw, tmp_path):
-    world, spec = trials("world"), draw(0, "single", days=1)
+    world, spec = trials("world").WORLD, draw(0, "single", days=1)
     with pytest.raises(ValueError, match="outside of the cases"):
         world.make(spec, tmp_path / "cases", tmp_path / "cases" / "sealed")
     made = []
@@ -364,7 +364,7 @@ def test_a_trial_is_the_same_twice_and_tells_nothing(trials, draw, tmp_path):
 @pytest.mark.parametrize("name", EFFECTS)
 def test_every_effect_is_made_and_changes_the_telemetry(trials, null, name, tmp_path):
     spec = with_effect(trials, null, name)
-    world = trials("world")
+    world = trials("world").WORLD
     for one in (null, spec):
         world.make(one, tmp_path / "cases", tmp_path / "sealed")
     frames = [load_case(tmp_path / "cases" / one.name).telemetry.frame for one in (null, spec)]

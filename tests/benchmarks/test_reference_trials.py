@@ -66,7 +66,7 @@ def test_air_is_metered_where_it_enters_and_followed_into_a_plenum(trials):
         ("Room", "plenum", "VAV_Room", 1.0), ("Room", "plenum", "FCU_Room", 1.0)
     ]  # fmt: skip
     del content["ZoneHVAC:FourPipeFanCoil"]
-    with pytest.raises(trials("errors").TrialError, match="expected a device whose air enters Room at 'coil out'"):
+    with pytest.raises(trials("buildings").TrialError, match="expected a device whose air enters Room at 'coil out'"):
         buildings.inlets(building)
 
 
@@ -186,7 +186,7 @@ def test_what_is_asked_for_changes_nothing(trials, monkeypatch):
 @pytest.mark.energyplus
 @needs_energyplus
 def test_a_trial_is_a_case_that_tells_nothing(trials, tmp_path):
-    world, spec = trials("world"), trials("specification").draw_spec(5, "single", days=2)
+    world, spec = trials("world").WORLD, trials("specification").draw_spec(5, "single", days=2)
     spec = trials("specification").replace(spec, wanted=(("infiltration", 1.0),), steps_per_hour=4)
     with pytest.raises(ValueError, match="outside of the cases"):
         world.make(spec, tmp_path / "cases", tmp_path / "cases" / "sealed")
