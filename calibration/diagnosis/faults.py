@@ -1,4 +1,4 @@
-"""Faults of the telemetry that it shows itself: a weather clock against the sun, two zones' sensors exchanged.
+"""Faults of the telemetry that it shows itself: clocks of the weather or of heat, two zones' sensors exchanged.
 
 No term of a model can put them right, and no model is needed to see them. They are mended in the telemetry, one after
 another. Light at night needs no model to be a fault; what is likely only counts where the mended case predicts days
@@ -20,6 +20,7 @@ from calibration.progress import Forward, Progress
 from thermal.case.case import Case
 from thermal.case.plausibility.anomaly import Anomaly
 from thermal.case.plausibility.exchanged import exchanged_zones
+from thermal.case.plausibility.heat_clock import heat_clock_errors
 from thermal.case.plausibility.irradiance import clock_errors
 from thermal.case.points import ZONE_TEMPERATURE
 
@@ -31,7 +32,7 @@ LEAST = 0.05
 #: How sure a fault is that telemetry shows, and where it is likely only that a fit confirms [-].
 _PROBABILITY = {"certain": 0.99, "likely": 0.95}
 
-#: Half of the distance between errors of a clock that are looked for [h].
+#: Half of the distance between errors of the weather's clock that are looked for [h]; of heat's it is half a step.
 _HALF_AN_ERROR = 0.25
 
 
@@ -55,8 +56,10 @@ class Fault:
         ``clock_shift`` or ``swapped_sensors``.
     zones : tuple of str
         Whose sensors are exchanged.
+    moved : str
+        What has to be moved in time: ``weather``, ``heat``, or nothing.
     hours : float
-        By how much the weather has to be moved [h].
+        By how much [h].
     seen : Anomaly
         What the telemetry shows.
     mended : Case
@@ -67,6 +70,7 @@ class Fault:
 
     effect: str
     zones: tuple[str, ...]
+    moved: str
     hours: float
     seen: Anomaly
     mended: Case
@@ -86,7 +90,8 @@ class Fault:
     def to_dict(self) -> dict[str, Any]:
         """Entry of ``faults`` in ``diagnosis.json``."""
         return {
-            "effect": self.effect, "zones": list(self.zones), "hours": self.hours, "what": self.seen.what,
+            "effect": self.effect, "zones": list(self.zones), "moved": self.moved, "hours": self.hours,
+            "what": self.seen.what,
             "advice": self.seen.advice, "left_out_mae_before": self.before.left_out,
             "left_out_mae_after": self.after.left_out,
         }  # fmt: skip
@@ -118,11 +123,13 @@ def suspected(case: Case) -> Iterator[Fault]:
     """
     for seen in clock_errors(case):
         if seen.moved and seen.certainty in _PROBABILITY:
-            yield Fault("clock_shift", (), seen.moved, seen, case.with_weather_moved(seen.moved))
+            yield Fault("clock_shift", (), "weather", seen.moved, seen, case.with_weather_moved(seen.moved))
+    for seen in heat_clock_errors(case):
+        yield Fault("clock_shift", (), "heat", seen.moved, seen, case.with_heat_moved(seen.moved))
     for seen in exchanged_zones(case):
         columns = [c for c in seen.columns if c.endswith(f"/{ZONE_TEMPERATURE}")]
         if len(columns) == 2 and seen.certainty in _PROBABILITY:
-            yield Fault("swapped_sensors", _zones_of(case, columns), 0.0, seen, _exchanged(case, columns))
+            yield Fault("swapped_sensors", _zones_of(case, columns), "", 0.0, seen, _exchanged(case, columns))
 
 
 def mend(
@@ -154,7 +161,7 @@ def mend(
     found: list[Fault] = []
     drawn: FittedCase | None = None
     kept: FittedCase | None = None
-    tried: set[tuple[str, tuple[str, ...]]] = set()
+    tried: set[tuple[str, tuple[str, ...], str]] = set()
 
     def fitted(of: Case, like: CalibrationSettings) -> FittedCase:
         fit = fit_case(of, tune, hold_out, like, whole.part(0.5))
@@ -162,11 +169,11 @@ def mend(
 
     while True:
         of = found[-1].mended if found else case
-        left = [f for f in suspected(of) if (f.effect, f.zones) not in tried]
+        left = [f for f in suspected(of) if (f.effect, f.zones, f.moved) not in tried]
         fault = min(left, key=lambda f: not f.is_certain, default=None)  # what is certain first
         if fault is None:
             return tuple(found)
-        tried.add((fault.effect, fault.zones))
+        tried.add((fault.effect, fault.zones, fault.moved))
         drawn = drawn or fitted(of, chosen)
         if fault.is_certain:
             kept = kept or _climbed(drawn, whole.part(0.5))
@@ -207,16 +214,15 @@ def with_faults(verdict: Verdict, faults: Sequence[Fault]) -> Verdict:
     """
     if not faults:
         return verdict
-    first = [
-        Candidate(
-            f.effect, f.probability, float("inf"), (f.effect,), f.zones, _parameters(f), 1.0, f.seen.advice
-        )
-        for f in faults
-    ]  # fmt: skip
-    names = tuple(f.effect for f in faults)
+    first: dict[tuple[str, tuple[str, ...]], Candidate] = {}
+    for f in faults:
+        own = Candidate(f.effect, f.probability, float("inf"), (f.effect,), f.zones, _parameters(f), 1.0, f.seen.advice)
+        known = first.setdefault((f.effect, f.zones), own)  # clocks of weather and of heat are one effect
+        first[f.effect, f.zones] = replace(known, parameters={**known.parameters, **own.parameters})
+    names = tuple(dict.fromkeys(f.effect for f in faults))
     rest = [c for c in verdict.candidates if c.effect not in names]
     return replace(
-        verdict, name="named" if verdict.name == "no_gap" else verdict.name, candidates=(*first, *rest),
+        verdict, name="named" if verdict.name == "no_gap" else verdict.name, candidates=(*first.values(), *rest),
         set90=(*names, *(e for e in verdict.set90 if e not in names)),
     )  # fmt: skip
 
@@ -224,8 +230,8 @@ def with_faults(verdict: Verdict, faults: Sequence[Fault]) -> Verdict:
 def _parameters(fault: Fault) -> dict[str, Estimate]:
     if not fault.hours:
         return {}
-    ends = fault.hours - _HALF_AN_ERROR, fault.hours + _HALF_AN_ERROR
-    return {"weather_moved": Estimate(fault.hours, "h", ends)}
+    half = 0.5 * fault.mended.step / 3600.0 if fault.moved == "heat" else _HALF_AN_ERROR
+    return {f"{fault.moved}_moved": Estimate(fault.hours, "h", (fault.hours - half, fault.hours + half))}
 
 
 def _zones_of(case: Case, columns: Sequence[str]) -> tuple[str, ...]:

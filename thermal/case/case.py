@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from functools import cached_property
@@ -169,9 +170,32 @@ class Case:
         Case
             With the same stamps; what comes in at an end is the value there.
         """
+        return self._with_moved(lambda entity, point: entity == self.building.weather_station, hours)
+
+    def with_heat_moved(self, hours: float) -> Case:
+        """Move what devices say but for setpoints and air of zones, as if the clock of heat's meters had been wrong.
+
+        Parameters
+        ----------
+        hours
+            By how much later it is said [h], rounded to whole steps; negative for earlier.
+
+        Returns
+        -------
+        Case
+            With the same stamps; what comes in at an end is the value there.
+        """
+        devices = {device.name for device in self.building.devices}
+
+        def are_moved(entity: str, point: str) -> bool:
+            return entity in devices and not point.startswith("zone_") and not point.endswith("_setpoint")
+
+        return self._with_moved(are_moved, hours)
+
+    def _with_moved(self, are_moved: Callable[[str, str], bool], hours: float) -> Case:
         frame = self.telemetry.frame.copy()
         steps = round(hours * 3600.0 / self.step)
-        columns = [str(c) for c in frame if str(c).startswith(f"{self.building.weather_station}/")]
+        columns = [c for c in map(str, frame) if are_moved(c.rpartition("/")[0], c.rpartition("/")[2])]
         rows = np.clip(np.arange(len(frame)) - steps, 0, len(frame) - 1)
         frame[columns] = frame[columns].to_numpy()[rows]
         return Case(self.building, replace(self.telemetry, frame=frame))

@@ -129,4 +129,4 @@ def test_a_fault_comes_first_and_is_named() -> None:
     assert fault.how_far(0.1)["share_closed"] == pytest.approx(0.6)
     text = faults_sentence(cast(Diagnosis, SimpleNamespace(faults=(fault,))))
     assert "-2 h" in text and "0.40 K instead of 0.80 K" in text
-    assert np.isnan(Fault("clock_shift", (), 1.0, fault.seen, late()).before.held_out)
+    assert np.isnan(Fault("clock_shift", (), "weather", 1.0, fault.seen, late()).before.held_out)

@@ -41,7 +41,7 @@ def test_a_likely_fault_is_held_against_what_is_missing_without_it(
     case = load_bundled_case()
     begin, end = case.telemetry.frame.index[[0, -1]]
     seen = Anomaly("exchanged", "warning", certainty, (), begin, end, "exchanged", "exchange them")
-    fault = Fault("swapped_sensors", ("F1_N", "F1_S"), 0.0, seen, case)
+    fault = Fault("swapped_sensors", ("F1_N", "F1_S"), "", 0.0, seen, case)
     errors: Iterator[float] = iter(left)
 
     def answer(models: Any, *_: object) -> Sought:

@@ -17,7 +17,7 @@ class Anomaly:
     ----------
     kind
         ``no heat``, ``no outdoor temperature``, ``no zone temperature``, ``range``, ``unit``, ``disagreement``,
-        ``night offset``, ``clock``, ``standstill``, ``exchanged``, ``heat`` or ``rate``.
+        ``night offset``, ``clock``, ``heat clock``, ``standstill``, ``exchanged``, ``heat`` or ``rate``.
     severity
         ``error``: the case is not valid for calibration; ``warning``: a fit would be wrong in part; ``remark``.
     certainty

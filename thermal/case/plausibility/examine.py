@@ -6,6 +6,7 @@ from thermal.case.building import OUTDOOR
 from thermal.case.case import Case
 from thermal.case.plausibility.anomaly import Anomaly
 from thermal.case.plausibility.exchanged import exchanged_zones
+from thermal.case.plausibility.heat_clock import heat_clock_errors
 from thermal.case.plausibility.irradiance import clock_errors, night_offsets
 from thermal.case.plausibility.magnitude import magnitudes
 from thermal.case.plausibility.sensors import disagreements, out_of_range
@@ -38,7 +39,7 @@ def examine(case: Case) -> tuple[Anomaly, ...]:
     looks = (_lacking, standstills, magnitudes, clock_errors, night_offsets, disagreements, out_of_range)
     found = [anomaly for look in looks for anomaly in look(case)]
     if all(anomaly.severity != "error" for anomaly in found):  # of heat or temperatures that cannot be, nothing follows
-        found += exchanged_zones(case)
+        found += [*exchanged_zones(case), *heat_clock_errors(case)]
     return tuple(sorted(found, key=lambda anomaly: ("error", "warning", "remark").index(anomaly.severity)))
 
 
