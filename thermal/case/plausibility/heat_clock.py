@@ -82,8 +82,8 @@ def _answers(case: Case) -> FloatArray:
             continue
         told = np.lib.stride_tricks.sliding_window_view(changes, len(bends))[::-1]  # a row an error, from -most on
         found.append([_correlation(bends, row) for row in told])
-    answers = np.asarray(found).reshape(len(found), 2 * most + 1)
-    return answers[np.isfinite(answers).all(axis=1)]
+    answers = np.array(found, dtype=float).reshape(len(found), 2 * most + 1)
+    return np.asarray(answers[np.isfinite(answers).all(axis=1)])
 
 
 def _correlation(a: FloatArray, b: FloatArray) -> float:
