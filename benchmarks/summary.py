@@ -49,7 +49,7 @@ def summary() -> str:
     solver = solvers["ours: fatrop in stages"]
     lines = [
         ("diagnosis", f"right effect first in {first['share']} ({first['number']}) of blind trials of offices with a "
-                      f"gap over 0.05 K, in {_short(worlds['singles right first'])} over four worlds of buildings, "
+                      f"gap over 0.05 K, in {_short(worlds['singles right first'])} over five worlds of buildings, "
                       f"measured ones among them; wrong names in {wrong['share']} and "
                       f"{_short(worlds['wrong names of all'])} of all",
          "results", "how-often-the-diagnosis-is-right"),
