@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 from thermal import load_bundled_case
+from thermal.case.building import Device
 from thermal.case.case import Case
 from thermal.case.plausibility.examine import examine
 from thermal.case.plausibility.heat_clock import heat_clock_errors
@@ -39,6 +40,22 @@ def test_a_clock_of_heat_that_is_off_is_found_to_the_step_and_put_right(hours: f
 
 def test_nothing_is_found_where_no_clock_is_off() -> None:
     assert not list(heat_clock_errors(load_bundled_case()))
+
+
+@pytest.mark.parametrize(("kind", "minutes", "found"), [
+    ("electric_heater", 25.0, True), ("radiator", 25.0, False), ("radiator", 40.0, True), ("radiator", -10.0, True),
+])  # fmt: skip
+def test_hot_water_may_take_half_an_hour_from_its_meter(kind: str, minutes: float, found: bool) -> None:
+    case = load_bundled_case()
+    heat = case.zone_heat()
+    devices = tuple(Device(name=f"{kind} {zone}", type=kind, zone=zone) for zone in case.building.zone_names)
+    kept = [c for c in case.telemetry.frame if c.startswith("weather_station/")]
+    told = {f"{kind} {zone}/{HEATING_POWER}": heat[zone] for zone in case.building.zone_names}
+    rooms = {f"{zone}/{ZONE_TEMPERATURE}": t for zone, t in case.zone_temperatures().items()}
+    frame = case.telemetry.frame[kept].assign(**told, **rooms)
+    own = changed(replace(case, building=replace(case.building, devices=devices)), frame)
+    seen = list(heat_clock_errors(own.with_heat_moved(-minutes / 60.0)))
+    assert [a.moved for a in seen] == [pytest.approx(minutes / 60.0)] * found
 
 
 def test_what_is_moved_is_heat_alone() -> None:
