@@ -68,9 +68,10 @@ def heat_clock_errors(case: Case) -> Iterator[Anomaly]:
     devices = {device.name for device in case.building.devices if device.zone}
     columns = tuple(c for c in map(str, case.telemetry.frame) if c.partition("/")[0] in devices and c.endswith(points))
     minutes = steps * case.step / 60.0
+    rooms = f"{len(answers)} zone{'s' * (len(answers) > 1)}"
     what = (
         f"zones answer to heat {abs(minutes):.0f} min {'after' if steps > 0 else 'before'} it is told: the correlation "
-        f"is {mean[middle + steps]:.2f} there, {as_it_is:.2f} without an error of the clock ({len(answers)} zones)"
+        f"is {mean[middle + steps]:.2f} there, {as_it_is:.2f} without an error of the clock (mean of {rooms})"
     )
     advice = f"see whether the clock of the meters is off, and move the stamps of heat by {minutes:+.0f} min"
     ends = case.stamps[0], case.stamps[-1]
