@@ -217,8 +217,10 @@ def with_faults(verdict: Verdict, faults: Sequence[Fault]) -> Verdict:
     first: dict[tuple[str, tuple[str, ...]], Candidate] = {}
     for f in faults:
         own = Candidate(f.effect, f.probability, float("inf"), (f.effect,), f.zones, _parameters(f), 1.0, f.seen.advice)
-        known = first.setdefault((f.effect, f.zones), own)  # clocks of weather and of heat are one effect
-        first[f.effect, f.zones] = replace(known, parameters={**known.parameters, **own.parameters})
+        if (known := first.get((f.effect, f.zones))) is not None:  # clocks of weather and of heat are one effect
+            parameters, advice = {**known.parameters, **own.parameters}, f"{known.separate_by}; {own.separate_by}"
+            own = replace(known, parameters=parameters, separate_by=advice)
+        first[f.effect, f.zones] = own
     names = tuple(dict.fromkeys(f.effect for f in faults))
     rest = [c for c in verdict.candidates if c.effect not in names]
     return replace(

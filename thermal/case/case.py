@@ -173,7 +173,7 @@ class Case:
         return self._with_moved(lambda entity, point: entity == self.building.weather_station, hours)
 
     def with_heat_moved(self, hours: float) -> Case:
-        """Move what devices say but for setpoints and air of zones, as if the clock of heat's meters had been wrong.
+        """Move what devices say but for setpoints and air of zones and outdoors, as if their meters' clock was wrong.
 
         Parameters
         ----------
@@ -188,7 +188,8 @@ class Case:
         devices = {device.name for device in self.building.devices}
 
         def are_moved(entity: str, point: str) -> bool:
-            return entity in devices and not point.startswith("zone_") and not point.endswith("_setpoint")
+            own = not point.startswith(("zone_", "outside_")) and not point.endswith("_setpoint")
+            return entity in devices and own
 
         return self._with_moved(are_moved, hours)
 

@@ -6,20 +6,16 @@ import numpy as np
 
 from thermal._types import FloatArray
 from thermal.case.case import Case
-from thermal.case.emitters import is_heater
 from thermal.case.plausibility.anomaly import Anomaly
 from thermal.case.points import DISCHARGE_TEMPERATURE, HEATING_POWER, SUPPLY_FLOW
 
 #: Errors of a clock that are looked for [s]; at least two steps.
 MOST = 7200.0
 
-#: Steps after heat up to which a zone may begin to warm up where no clock is wrong [-]: means over a step answer half a
-#: step late, and a sensor, a radiator or a slab that lags answers at once, if only in part.
-NATURAL = 1
-
-#: Time that hot water may take from a meter to what it heats [s], where devices do not say that they are electric or
-#: bring air. Not fitted: a litre for a metre of pipe and a radiator's least flow of 1 to 2 l/min make minutes.
-BY_WATER = 1800.0
+#: Time after heat within which a zone may begin to warm up where no clock is wrong [s], and least number of steps. Not
+#: fitted: means over a step answer half a step late, hot water takes minutes from its meter to a radiator, and of lags
+#: one after another (a heater's body, a sensor in its case) the answer is largest up to 25 minutes late.
+LATE, LEAST_LATE = 1800.0, 1
 
 #: Least correlation of a zone's answer with heat [-], and times as much as without an error of the clock. Chosen on a
 #: house whose clock is 36 minutes off (0.72 there, 0.12 as it is) and 168 cases without such an error, of five makers
@@ -49,7 +45,7 @@ def heat_clock_errors(case: Case) -> Iterator[Anomaly]:
     A change of heat bends the course of a temperature where it takes effect: the change of heat from a step to the next
     is correlated with the second difference of the zone's temperature, for each error of a clock, which neither sun
     nor weather nor the slow part of the answer disturb much. A first-order lag leaves the largest correlation where it
-    is and lessens it.
+    is and lessens it; several of them move it by less than `LATE`.
     """
     answers = _answers(case)
     if not len(answers):
@@ -58,8 +54,7 @@ def heat_clock_errors(case: Case) -> Iterator[Anomaly]:
     mean = answers.mean(axis=0)
     steps = int(np.argmax(mean)) - middle
     own = np.argmax(answers, axis=1) - middle
-    water = any(is_heater(device) and not device.type.startswith("electric") for device in case.building.devices)
-    natural = max(NATURAL, round(BY_WATER / case.step) if water else 0)
+    natural = max(LEAST_LATE, round(LATE / case.step))
     as_it_is = mean[middle : middle + natural + 1].max()
     alike = 2 * int((np.abs(own - steps) <= 1).sum()) > len(own)
     if 0 <= steps <= natural or mean[middle + steps] < max(LEAST, TIMES * as_it_is) or not alike:
@@ -84,20 +79,35 @@ def _answers(case: Case) -> FloatArray:
     most = max(2, round(MOST / case.step))
     found = []
     for zone in temperatures:
-        bends = np.diff(temperatures[zone].to_numpy(dtype=float), n=2)[most:-most]
+        bends = np.diff(temperatures[zone].to_numpy(dtype=float), n=2)
         changes = np.diff(heat[zone].to_numpy(dtype=float))[1:]
-        if len(bends) < LEAST_STEPS or not np.nanmax(np.abs(changes), initial=0.0) > 0.0:
-            continue
-        told = np.lib.stride_tricks.sliding_window_view(changes, len(bends))[::-1]  # a row an error, from -most on
-        found.append([_correlation(bends, row) for row in told])
+        if len(bends) > 2 * most and np.nanmax(np.abs(changes), initial=0.0) > 0.0:
+            found.append(_correlations(bends, changes, most))
     answers = np.array(found, dtype=float).reshape(len(found), 2 * most + 1)
     return np.asarray(answers[np.isfinite(answers).all(axis=1)])
 
 
-def _correlation(a: FloatArray, b: FloatArray) -> float:
-    known = np.isfinite(a) & np.isfinite(b)
-    if known.sum() < LEAST_STEPS:
-        return float("nan")
-    a, b = a[known] - a[known].mean(), b[known] - b[known].mean()
-    scale = float(np.sqrt((a @ a) * (b @ b)))
-    return float(a @ b) / scale if scale > 0.0 else float("nan")
+def _correlations(late: FloatArray, early: FloatArray, most: int) -> FloatArray:
+    """Correlation of a series with another, from `most` steps later to as many earlier; NaN where few steps have both.
+
+    Sums over what both know at each distance are convolutions.
+    """
+    from scipy.signal import correlate  # here: scipy.signal takes a second to import
+
+    known = [np.isfinite(series) for series in (late, early)]
+    if min(map(np.sum, known)) < LEAST_STEPS:
+        return np.full(2 * most + 1, np.nan)
+    told = zip((late, early), known, strict=True)
+    a, b = (np.where(k, series - series[k].mean(), 0.0) / max(series[k].std(), 1e-300) for series, k in told)
+    here, there = (k.astype(float) for k in known)
+    middle = len(late) - 1
+
+    def sums(x: FloatArray, y: FloatArray) -> FloatArray:
+        return np.asarray(correlate(x, y, method="fft")[middle - most : middle + most + 1])
+
+    count = sums(here, there)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean_a, mean_b = sums(a, there) / count, sums(here, b) / count
+        spread_a, spread_b = sums(a * a, there) / count - mean_a**2, sums(here, b * b) / count - mean_b**2
+        r = (sums(a, b) / count - mean_a * mean_b) / np.sqrt(spread_a * spread_b)
+    return np.where(count > LEAST_STEPS - 0.5, r, np.nan)

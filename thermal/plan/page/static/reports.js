@@ -79,7 +79,7 @@ function put(place, made, children) {
 function card(kind, job, disabled) {
   const [title, text] = WORDS[kind] || [kind, ""];
   return [el("h3", {}, title), el("p", { class: "soft" }, text),
-    job ? el("div", { class: "working", id: `job-${kind}` }, el("p", { role: "status", "aria-live": "polite" }, words(job.state)), el("progress", job.state.total ? { max: job.state.total, value: job.state.done } : {}), el("button", { type: "button", onclick: () => job.stop.abort() }, "Stop"))
+    job ? el("div", { class: "working", id: `job-${kind}` }, el("p", { role: "status", "aria-live": "polite" }, words(job.state)), el("progress", job.state.total ? { max: job.state.total, value: job.state.done } : {}), el("button", { type: "button", onclick: () => jobs.get(kind)?.stop.abort() }, "Stop"))
       : el("button", { type: "button", class: "primary", id: `make-${kind}`, disabled, onclick: () => make(kind) }, `${title} now`)];
 }
 
