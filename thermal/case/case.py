@@ -196,7 +196,8 @@ class Case:
     def _with_moved(self, are_moved: Callable[[str, str], bool], hours: float) -> Case:
         frame = self.telemetry.frame.copy()
         steps = round(hours * 3600.0 / self.step)
-        columns = [c for c in map(str, frame) if are_moved(c.rpartition("/")[0], c.rpartition("/")[2])]
+        named = (c.rpartition("/") for c in map(str, frame))
+        columns = ["".join(parts) for parts in named if are_moved(parts[0], parts[2])]
         rows = np.clip(np.arange(len(frame)) - steps, 0, len(frame) - 1)
         frame[columns] = frame[columns].to_numpy()[rows]
         return Case(self.building, replace(self.telemetry, frame=frame))

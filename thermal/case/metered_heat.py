@@ -13,7 +13,8 @@ from thermal.case.points import DISCHARGE_TEMPERATURE, HEATING_POWER, SUPPLY_FLO
 from thermal.case.validation import TERMINAL_TYPES
 from thermal.units import AIR_HEAT_CAPACITY
 
-_POINTS = (SUPPLY_FLOW, DISCHARGE_TEMPERATURE, HEATING_POWER)
+#: Points of a device that tell its heat.
+HEAT_POINTS = (SUPPLY_FLOW, DISCHARGE_TEMPERATURE, HEATING_POWER)
 
 #: Points that the parts of `heat_parts` follow from.
 _OF_PARTS = ((SUPPLY_FLOW, DISCHARGE_TEMPERATURE), (HEATING_POWER,))
@@ -45,7 +46,7 @@ def heat_parts(
         zone = device.zone
         if zone is None:
             continue
-        flow, _, watts = (frame.get(f"{device.name}/{point}") for point in _POINTS)
+        flow, _, watts = (frame.get(f"{device.name}/{point}") for point in HEAT_POINTS)
         discharge = frame.get(air_column(building, device, columns) or "")
         if watts is not None:
             power[zone] = power.get(zone, 0.0) + watts
@@ -133,5 +134,5 @@ def _is_unmetered(building: Building, device: Device, frame: pd.DataFrame) -> bo
     """Whether a device gives heat, and nothing tells how much."""
     if any(own.device == device.name for own in building.commanded):
         return False
-    flow, discharge, power = (f"{device.name}/{point}" in frame for point in _POINTS)
+    flow, discharge, power = (f"{device.name}/{point}" in frame for point in HEAT_POINTS)
     return not flow and not power and (discharge or device.type in TERMINAL_TYPES)

@@ -6,8 +6,8 @@ import numpy as np
 
 from thermal._types import FloatArray
 from thermal.case.case import Case
+from thermal.case.metered_heat import HEAT_POINTS
 from thermal.case.plausibility.anomaly import Anomaly
-from thermal.case.points import DISCHARGE_TEMPERATURE, HEATING_POWER, SUPPLY_FLOW
 
 #: Errors of a clock that are looked for [s]; at least two steps.
 MOST = 7200.0
@@ -59,9 +59,9 @@ def heat_clock_errors(case: Case) -> Iterator[Anomaly]:
     alike = 2 * int((np.abs(own - steps) <= 1).sum()) > len(own)
     if 0 <= steps <= natural or mean[middle + steps] < max(LEAST, TIMES * as_it_is) or not alike:
         return
-    points = (HEATING_POWER, SUPPLY_FLOW, DISCHARGE_TEMPERATURE)
     devices = {device.name for device in case.building.devices if device.zone}
-    columns = tuple(c for c in map(str, case.telemetry.frame) if c.partition("/")[0] in devices and c.endswith(points))
+    told = (c for c in map(str, case.telemetry.frame) if c.endswith(HEAT_POINTS))
+    columns = tuple(c for c in told if c.partition("/")[0] in devices)
     minutes = steps * case.step / 60.0
     rooms = f"{len(answers)} zone{'s' * (len(answers) > 1)}"
     what = (
