@@ -19,6 +19,7 @@ from ideal_air_trials.specification import (
     KINDS,
     MOST_DAYS,
     OUTSIDE,
+    PAIR,
     SINGLE,
     USE,
     WEATHER,
@@ -76,14 +77,15 @@ def draw_spec(seed: int, kind: Kind, *, confirmation: bool = False, days: int = 
     """Draw a trial.
 
     Office, weather, use and noise depend on stream and seed alone, so that the null of a seed is the twin of its single
-    and of what it has outside of the catalogue. The office is one that can have the single's effect.
+    and of what it has outside of the catalogue. The office is one that can have the single's effect, which is one of
+    its pair's.
 
     Parameters
     ----------
     seed : int
         Number of the trial in its stream, at least 0; effects take turns.
-    kind : {"null", "single", "outside"}
-        No effect, one of the catalogue, or one that it does not know.
+    kind : {"null", "single", "pair", "outside"}
+        No effect, one or two of the catalogue, or one that it does not know.
     confirmation : bool
         Draw from the stream that nothing is tuned on.
     days : int
@@ -112,9 +114,18 @@ def draw_spec(seed: int, kind: Kind, *, confirmation: bool = False, days: int = 
     )  # fmt: skip
     if kind == "null":
         return null
-    purpose = SINGLE if kind == "single" else OUTSIDE
-    effect = draw_effect(_turn(stream, seed, purpose), null, generator(stream, seed, purpose))
-    return replace(null, kind=kind, effects=(effect,))
+    purpose = OUTSIDE if kind == "outside" else SINGLE
+    first = draw_effect(_turn(stream, seed, purpose), null, generator(stream, seed, purpose))
+    if kind != "pair":
+        return replace(null, kind=kind, effects=(first,))
+    rng = generator(stream, seed, PAIR)
+    second = draw_effect(str(rng.choice([e for e in CATALOGUE if e != first.name and _can_have(null, e)])), null, rng)
+    return replace(null, kind=kind, effects=tuple(sorted((first, second), key=lambda e: list(CATALOGUE).index(e.name))))
+
+
+def _can_have(null: Spec, name: str) -> bool:
+    """Whether an office can have an effect that it was not drawn for; thin slabs, which one takes, are."""
+    return name != "interfloor_exchange" and (name != "neighbour" or null.layout.blank is not None)
 
 
 def _turn(stream: int, seed: int, purpose: int) -> str:

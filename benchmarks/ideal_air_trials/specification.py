@@ -15,8 +15,8 @@ from _worlds import Effect
 
 from ideal_air_trials.plan import Layout
 
-Kind = Literal["null", "single", "outside"]
-KINDS: tuple[Kind, ...] = ("null", "single", "outside")
+Kind = Literal["null", "single", "pair", "outside", "without"]
+KINDS: tuple[Kind, ...] = ("null", "single", "pair", "outside")
 DAYS = 21  # of telemetry
 LEAD_DAYS = 3  # that EnergyPlus runs after its warm-up and before the telemetry
 MOST_DAYS = 60  # so that the latest start, in October, ends within the year of the weather file
@@ -26,7 +26,7 @@ YEAR = 2023  # stands for the typical years of weather files, which have none; i
 
 DEVELOPMENT, CONFIRMATION = 0, 1
 #: Purposes of random numbers, so that none disturbs another.
-BUILDING, WEATHER, USE, NOISE, SINGLE, OUTSIDE, OPENINGS = range(7)
+BUILDING, WEATHER, USE, NOISE, SINGLE, OUTSIDE, OPENINGS, PAIR = range(8)
 #: First number of every seed sequence of a stream, so that what one draws the other never does.
 _FIRST = {DEVELOPMENT: 20261130, CONFIRMATION: 20261201}
 
@@ -135,7 +135,7 @@ class Spec:
     seed : int
         Number of the trial in its stream. All but the effects depends on stream and seed only.
     kind : str
-        One of `KINDS`.
+        One of `KINDS`, or ``without``: a pair less one effect.
     days : int
         Length of the telemetry [d].
     layout, fabric, terminal, climate
@@ -164,6 +164,8 @@ class Spec:
     def name(self) -> str:
         """Name of case folder and label, which says nothing about the effects."""
         text = f"ideal_air:{self.stream}:{self.seed}:{self.kind}:{self.days}"
+        if self.kind == "without":  # a pair has two of them
+            text += f":{','.join(effect.name for effect in self.effects)}"
         return "trial_" + hashlib.sha256(text.encode()).hexdigest()[:10]
 
     @property
@@ -177,9 +179,13 @@ class Spec:
         first = date.fromisoformat(self.climate.start) - timedelta(days=LEAD_DAYS)
         return pd.date_range(first, periods=(LEAD_DAYS + self.days) * STEPS_PER_DAY, freq=STEP)
 
-    def twin(self) -> Spec:
-        """Return the null of the same seed."""
-        return replace(self, kind="null", effects=())
+    def twins(self) -> tuple[Spec, ...]:
+        """Return the trials of the same seed without each of the effects: the null of a single."""
+        return tuple(self._less(effect) for effect in self.effects)
+
+    def _less(self, effect: Effect) -> Spec:
+        others = tuple(other for other in self.effects if other is not effect)
+        return replace(self, kind="without" if others else "null", effects=others)
 
     def effect(self, name: str) -> Effect | None:
         """Return the effect of a name, None where the trial has it not.
@@ -203,7 +209,7 @@ class Spec:
         words = f"{self.layout.kind}, {self.layout.floors} floors, {len(self.zone_names)} zones"
         return plain | {
             "name": self.name, "world": "ideal_air", "building": words,
-            "twins": [self.twin().name for _ in self.effects], "run": dict(run),
+            "twins": [twin.name for twin in self.twins()], "run": dict(run),
         }  # fmt: skip
 
 
@@ -217,6 +223,6 @@ def generator(stream: int, seed: int, purpose: int) -> np.random.Generator:
     seed : int
         Number of the trial in its stream, at least 0.
     purpose : int
-        What they are for: `BUILDING` to `OPENINGS`.
+        What they are for: `BUILDING` to `PAIR`.
     """
     return np.random.default_rng([_FIRST[stream], seed, purpose])

@@ -117,15 +117,28 @@ def reported(trials, spec, weather) -> pd.DataFrame:
 
 
 def test_a_seed_says_everything_and_the_null_is_its_twin(draw):
-    for kind in ("null", "single", "outside"):
+    for kind, count in (("null", 0), ("single", 1), ("outside", 1), ("pair", 2)):
         for seed in range(20):
             spec = draw(seed, kind)
-            assert spec == draw(seed, kind) and spec.twin() == draw(seed, "null")
-            assert len(spec.effects) == (kind != "null") and spec.kind == kind
+            assert spec == draw(seed, kind) and len(spec.effects) == count and spec.kind == kind
+            assert replace(spec, kind="null", effects=()) == draw(seed, "null")
             assert spec.name.startswith("trial_") and len(spec.name) == 16
-    for seed, kind, days in ((0, "pair", 21), (-1, "null", 21), (0, "null", 0), (0, "null", 90)):
+    for seed, kind, days in ((0, "triple", 21), (-1, "null", 21), (0, "null", 0), (0, "null", 90)):
         with pytest.raises(ValueError, match="expected a seed"):
             draw(seed, kind, days=days)
+
+
+def test_twins_lack_one_effect_each(draw, package):
+    without = package("ideal_air_trials.world").WORLD.draw(4, "without")
+    for seed in range(40):
+        null, single, pair = (draw(seed, kind) for kind in ("null", "single", "pair"))
+        assert single.twins() == (null,) and null.twins() == ()
+        first, second = pair.effects
+        assert single.effects[0] in pair.effects and first.name != second.name
+        assert [twin.effects for twin in pair.twins()] == [(second,), (first,)]
+        assert len({pair.name, single.name, *(twin.name for twin in pair.twins())}) == 4
+        assert "neighbour" not in {e.name for e in pair.effects} or pair.layout.blank
+    assert without == draw(4, "pair").twins()
 
 
 def test_streams_share_nothing(draw):
@@ -299,10 +312,10 @@ def test_metered_heat_is_that_of_the_terminal_or_what_it_believes_to_give(trials
 
 
 def test_labels_hold_what_scores_read(trials, draw, script):
-    for kind in ("null", "single", "outside"):
+    for kind in ("null", "single", "outside", "pair"):
         spec = draw(4, kind)
         label = json.loads(json.dumps(spec.label({"seconds": 1.0})))
-        assert label["twins"] == [spec.twin().name] * len(spec.effects) and label["world"] == "ideal_air"
+        assert label["twins"] == [twin.name for twin in spec.twins()] and label["world"] == "ideal_air"
         answer: dict[str, Any] = {"verdict": "named", "which": [], "gap": {"mae": 0.3}}
         trial = script("_trial_scores").trial_of(spec.name, label, answer, [0.1] * len(spec.effects))
         assert trial.kind == kind and trial.building.endswith("zones") and trial.counted
