@@ -17,6 +17,7 @@ from mpc.reports.page import duration, estimated_sentences, kelvin, listed, perc
 from thermal.effects.catalogue import CATALOGUE, effect_of, is_effect
 from thermal.effects.gains import SWITCHED_HEAT
 from thermal.inputs.provider import IRRADIANCE
+from thermal.network.structure import MAY_DIFFER
 
 #: What an effect is called where its title would read oddly after "leaves out".
 _CALLED = {"hidden_mass": "mass that stores heat"}
@@ -67,6 +68,14 @@ def diagnosis_verdict(result: Diagnosis) -> str:
             f" Rooms hold {times} times the heat that their air does, by light things that follow it within minutes; "
             "sensors that lag would look alike."
         )
+    for effect in result.settings.structure.uneven:
+        shares = [v for n, v in result.final.values.items() if n.startswith(f"{MAY_DIFFER[effect]}@")]
+        if shares:
+            low, high = (significant(end) for end in (min(shares), max(shares)))
+            text += (
+                f" Rooms differ in {called(effect)}: they have {low} to {high} times what is usual in this building; "
+                "while all were alike it looked like another effect."
+            )
     if zoned := [name for name, scope in result.settings.scopes.items() if scope == "zone"]:
         what = [words for part, words in _OWN.items() if any(name.startswith(part) for name in zoned)]
         text += (

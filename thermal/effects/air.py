@@ -75,12 +75,12 @@ def _build_infiltration(builder: EffectBuilder) -> None:
     terms = ((wind, _WIND, "wind", "K*m/s", _by_wind), (stack, _ROOT, "stack", "K^1.5", _by_stack))
     outdoor = builder.graph.boundary("outdoor")
     for room in _exposed(builder):
-        heat = builder.anatomy.air_heat_capacity * room.volume / 3600.0
-        builder.air_to(room, constant, outdoor, heat)
+        heat, share = builder.anatomy.air_heat_capacity * room.volume / 3600.0, builder.share(room.name)
+        builder.air_to(room, constant * share, outdoor, heat)
         for rate, mean, name, unit, of in terms:
-            builder.air_to(room, rate, outdoor, mean * heat)
+            builder.air_to(room, rate * share, outdoor, mean * heat)
             varying = Signal.made(f"{name} and cold in {room.name}", unit, of, *_OUT, given={"zone": room.name})
-            builder.heat_air(room, rate, varying, heat)
+            builder.heat_air(room, rate * share, varying, heat)
 
 
 def _build_bridge(builder: EffectBuilder) -> None:

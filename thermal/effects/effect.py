@@ -12,6 +12,7 @@ from thermal.errors import EffectError, nearest
 from thermal.inputs.provider import InputProvider
 from thermal.inputs.signals import Signal
 from thermal.network.graph import GraphBuilder
+from thermal.network.structure import MAY_DIFFER
 from thermal.network.topology import Anatomy, Emission, Room
 from thermal.parameters import Parameter
 
@@ -238,6 +239,17 @@ class EffectBuilder:
         elif facade is not None:
             found = found.of("facade", facade)
         return self.graph.own(found)
+
+    def share(self, room: str) -> ca.SX | float:
+        """Share that a room has of an effect of the whole building, 1 where rooms do not differ in it.
+
+        Parameters
+        ----------
+        room : str
+            Its name.
+        """
+        own = self.effect.id
+        return self.parameter(MAY_DIFFER[own], zone=room) if own in self.graph.structure.uneven else 1.0
 
     def key(self, what: str = "") -> str:
         """Name of a new class of this effect.

@@ -43,17 +43,22 @@ def _of_sun(name: str, of: Callable[..., FloatArray], azimuth: float, tilt: floa
 
 def _panes(builder: EffectBuilder, value: ca.SX, name: str, **given: float) -> None:
     """Bring sun through every pane: a share to the floor or furniture, the rest to the other surfaces."""
-    share = builder.graph.own(SOLAR_GAIN.parameters[1])
-    to_mass, to_surfaces = value * share, value * (1.0 - share)
+    share, parts = builder.graph.own(SOLAR_GAIN.parameters[1]), dict[str, tuple[ca.SX, ca.SX, ca.SX]]()
+    differ = SOLAR_GAIN.id in builder.graph.structure.uneven
     for pane in builder.anatomy.panes:
         room = builder.anatomy.rooms[pane.zone]
+        key = f"{name} in {pane.zone}" if differ else name
+        if key not in parts:
+            own = value * builder.graph.own(SOLAR_GAIN.parameters[2].of("zone", pane.zone)) if differ else value
+            parts[key] = own, own * share, own * (1.0 - share)
+        whole, to_mass, to_surfaces = parts[key]
         signal = _of_sun(name, _through, pane.azimuth, pane.tilt, **given)
         known = 1.0 if pane.transmittance is None else pane.transmittance / _USUAL_TRANSMITTANCE
         mass = room.floor[0] if room.floor else room.furniture
         if mass < 0:
-            builder.heat_surfaces(room, value, signal, known * pane.area)
+            builder.heat_surfaces(room, whole, signal, known * pane.area)
             continue
-        builder.graph.source(name, to_mass, mass, signal, known * pane.area)
+        builder.graph.source(key, to_mass, mass, signal, known * pane.area)
         builder.heat_surfaces(room, to_surfaces, signal, known * pane.area)
 
 
@@ -93,10 +98,11 @@ def _build_people(builder: EffectBuilder) -> None:
     arrival = Signal("coming and going", "1/h", attrgetter("occupancy_rate"), ("occupancy_rate",))
     served = {room.name for room in builder.rooms} <= builder.anatomy.served
     elsewhere = 1.0 if served else builder.parameter("internal_gain_unserved_share")
+    shares = {room.name: builder.share(room.name) for room in builder.rooms}
     for value, signal in ((peak, PRESENCE), (-peak * shift, arrival), (home, AT_HOME), (base, CONSTANT)):
         for room in builder.rooms:
             own = value if room.name in builder.anatomy.served else value * elsewhere
-            _give_half_to_air(builder, room, own, signal, room.floor_area)
+            _give_half_to_air(builder, room, own * shares[room.name], signal, room.floor_area)
 
 
 def _build_courses(builder: EffectBuilder) -> None:

@@ -32,6 +32,12 @@ RATED_OUTSIDE_FILM = 25.0
 #: Resistance of a single pane [m2K/W], 4 mm of glass at 1 W/m/K (EN 673:2011): the least that rated u-values may leave.
 LEAST_PANE_RESISTANCE = 0.004
 
+#: Effects of the whole building in which rooms may differ, with what a room's share is called.
+MAY_DIFFER = {
+    "infiltration": "infiltration_room_share", "internal_gains": "internal_gain_room_share",
+    "solar_gain": "solar_room_share",
+}  # fmt: skip
+
 #: Step of the paper's shuffle [s].
 SHUFFLE_STEP = 300.0
 
@@ -112,6 +118,8 @@ class Structure:
         which has one a zone.
     turned : float
         By how much the building stands clockwise of its drawing, -180 to 180 [deg], as its sun may tell.
+    uneven : tuple of str
+        Effects of which each room has a share of its own, of `MAY_DIFFER`, where they are of the whole building.
     emitter : {"air", "radiator", "floor"}
         What plain heaters of which a case does not say it give their heat by: the air alone, surfaces too, or floors
         too, each zone's by a share that is fitted.
@@ -139,6 +147,7 @@ class Structure:
     natural_films: bool = False
     light_contents: bool = False
     turned: float = 0.0
+    uneven: tuple[str, ...] = ()
     emitter: Unknown = "air"
 
     @property
@@ -153,6 +162,9 @@ class Structure:
                 raise ModelError(f"structure.{name}: expected true or false, got {getattr(self, name)!r}")
         if isinstance(self.turned, bool) or not isinstance(self.turned, int | float) or not abs(self.turned) <= 180.0:
             raise ModelError(f"structure.turned: expected -180 to 180 deg, got {self.turned!r}")
+        if isinstance(self.uneven, str) or not set(self.uneven) <= MAY_DIFFER.keys():
+            raise ModelError(f"structure.uneven: expected some of {tuple(MAY_DIFFER)}, got {self.uneven!r}")
+        object.__setattr__(self, "uneven", tuple(self.uneven))  # a file has a list
         if self.emitter not in get_args(Unknown):
             raise ModelError(f"structure.emitter: expected one of {get_args(Unknown)}, got {self.emitter!r}")
         for name, least in (("slab_nodes", 0), ("wall_nodes", 1)):

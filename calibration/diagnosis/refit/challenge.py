@@ -3,7 +3,8 @@
 A drawing has one value for the slabs and furniture of all zones, and zones differ in them; one that is no survey is
 wrong in what lies between rooms and outdoor, too. What that leaves is taken for a meter that is wrong zone by zone, and
 gains as much as a true one. Films and light contents are chosen before anything is sought, when what is missing may
-hide them: then sensors seem to lag once it is found.
+hide them: then sensors seem to lag once it is found. Heat of people, leaks and the sun are alike in all rooms at first,
+as watts per floor area, air changes and glass; what rooms differ in is then taken for their sensors and meters.
 """
 
 from collections.abc import Iterator, Sequence
@@ -19,6 +20,8 @@ from calibration.fit.ladder import by_zone
 from calibration.fit.starts import FAILURES
 from calibration.fit.undrawn import BY_EVIDENCE, UNDRAWN, is_another
 from calibration.progress import Progress
+from thermal.effects.catalogue import CATALOGUE
+from thermal.network.structure import MAY_DIFFER
 from thermal.parameters import Scope
 
 #: Effects that give a zone a part of its metered heat more or less, as another mass of the zone seems to, or later.
@@ -33,7 +36,8 @@ def challenge(
 ) -> tuple[ModelComparison, tuple[Round, ...]]:
     """Search anew about a building in another structure, where that is better evidence than what was found.
 
-    With masses by zone, with losses by zone where the drawing is no survey, or with films or light contents.
+    With masses by zone, with losses by zone where the drawing is no survey, with films or light contents, or with
+    rooms that differ in an effect that was found in all.
 
     They are weighed against what was found, alone and beside as much of it as does not act as masses do: what zones
     differ in takes further effects to imitate, and hides what is missing. Where something is left that no effect
@@ -62,7 +66,10 @@ def challenge(
     known = dict(rounds[0].before.effects)
     others = list(_others(models, rounds[0].before))
     for effects, least in _rivals(rounds, known):
-        fits = [(own, _fit(own, effects, final, least)) for own in others]
+        differing = [_differing(models, e) for e, where in effects.items() if e in MAY_DIFFER and not where]
+        if len(zones) == 1 or not any(CATALOGUE[e].takes_zones for e in final.effects if e not in effects):
+            differing = []
+        fits = [(own, _fit(own, effects, final, least)) for own in (*others, *differing)]
         better = [(own, fit) for own, fit in fits if fit is not None and fit.evidence >= least]
         for own, other in sorted(better, key=lambda found: -found[1].evidence):
             with suppress(*FAILURES):
@@ -95,6 +102,13 @@ def _others(models: ModelComparison, drawn: Fit) -> Iterator[ModelComparison]:
         other = models.built_as(replace(settings, structure=UNDRAWN[name].put(settings.structure)))
         if is_another(other.build(drawn.effects).network, drawn.built.network):
             yield other
+
+
+def _differing(models: ModelComparison, effect: str) -> ModelComparison:
+    """Let rooms differ in an effect of the whole building."""
+    structure = models.settings.structure
+    uneven = tuple(sorted({*structure.uneven, effect}))
+    return models.built_as(replace(models.settings, structure=replace(structure, uneven=uneven)))
 
 
 def _rivals(rounds: Sequence[Round], known: Effects) -> Iterator[tuple[Effects, float]]:

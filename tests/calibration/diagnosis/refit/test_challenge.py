@@ -1,9 +1,11 @@
-"""Masses, losses and light contents against instruments that are wrong: twins of either kind, what a search is told."""
+"""Masses, losses, contents and shares by room against wrong instruments: twins of either kind, what a search is told."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from calibration.diagnosis.refit import challenge as module
@@ -12,11 +14,17 @@ from calibration.diagnosis.refit.comparison import Fit, ModelComparison
 from calibration.diagnosis.screen.gains import choice_of
 from calibration.evaluation.settings import ModelSettings
 from calibration.fit.ladder import MASSES
-from thermal.case.building import GeometryQuality
+from thermal._types import FloatArray
+from thermal.case.building import FloorPlans, GeometryQuality
 from thermal.case.case import Case
+from thermal.case.plan import zone_floor_areas
 from thermal.case.telemetry import Telemetry
+from thermal.inputs.normalisation import fit_normalisation
+from thermal.inputs.provider import telemetry_inputs
+from thermal.network.structure import Structure
 from thermal.pilot.building import pilot_building
 from thermal.pilot.twin import TwinRanges, TwinSettings, generate_twin
+from thermal.pilot.weather import draw_disturbance
 from thermal.units import air_density
 
 
@@ -39,6 +47,27 @@ def full_of_light_things(monkeypatch: pytest.MonkeyPatch) -> Case:
     settings = TwinSettings(days=14.0, step_seconds=300.0, dx=1.0, meter="exact", ranges=quiet)
     with monkeypatch.context() as heavy:
         heavy.setattr("thermal.network.build.air_density", lambda elevation: 3.0 * air_density(elevation))
+        return generate_twin(building, 5, settings)[0]
+
+
+def crowded(monkeypatch: pytest.MonkeyPatch, shares: Sequence[float]) -> Case:
+    """A twin with people that no meter knows of, more of them in some rooms than in others."""
+    building = pilot_building(5, floor_area=120.0, zones=len(shares), floors=1, name="office")
+    quiet = TwinRanges(noise=(0.01, 0.02), disturbance_deviation=(0.01, 0.02))
+    settings = TwinSettings(days=14.0, step_seconds=900.0, dx=1.0, meter="exact", ranges=quiet)
+    empty = generate_twin(building, 5, settings)[0]
+    assert isinstance(empty.building.geometry, FloorPlans)
+    areas = zone_floor_areas(empty.building.geometry)
+    density = 10.0 * np.array([share * areas[zone] for share, zone in zip(shares, building.zone_names, strict=True)])
+    presence = telemetry_inputs(empty, fit_normalisation(empty)).occupancy
+
+    def heat(seed: int, count: int, *of: Any) -> FloatArray:
+        drawn = draw_disturbance(seed, count, *of)
+        drawn[count - presence.size :] += presence[:, None] * density
+        return drawn
+
+    with monkeypatch.context() as busy:
+        busy.setattr("thermal.pilot.twin.draw_disturbance", heat)
         return generate_twin(building, 5, settings)[0]
 
 
@@ -110,6 +139,33 @@ def test_light_contents_take_it_from_sensors_that_lag(
     assert again.settings.structure.light_contents and not again.settings.scopes
     assert not baseline.effects and baseline.evidence > after.evidence
     assert baseline.values["air_capacity_multiplier"] == pytest.approx(3.0, rel=0.1)
+
+
+@pytest.mark.parametrize("shares", [(1.5, 0.4, 1.3, 0.6, 1.2), (1.0, 1.0, 1.0, 1.0, 1.0)])
+def test_shares_of_rooms_take_it_from_their_meters(
+    told: list[tuple[ModelComparison, Fit]], monkeypatch: pytest.MonkeyPatch, shares: Sequence[float]
+) -> None:
+    models = ModelComparison(crowded(monkeypatch, shares), ModelSettings(dx=1.0))
+    zones, before = models.case.building.zone_names, models.fit({}, [{}])
+    people = models.fit({"internal_gains": ()}, [before.values])
+    after = models.fit({"internal_gains": (), "flow_gain": zones}, [people.values])
+    first, second = people.evidence - before.evidence, after.evidence - people.evidence - choice_of(5, 5)
+    rounds: list[Any] = [
+        SimpleNamespace(before=before, after=people, accepted=named("internal_gains", first)),
+        SimpleNamespace(before=people, after=after, accepted=named("flow_gain", second)),
+    ]
+    apart = models.built_as(replace(models.settings, structure=Structure(uneven=("internal_gains",))))
+    unlike = apart.fit({"internal_gains": ()}, [people.values])
+    assert first > 6.0
+    if len(set(shares)) == 1:  # shares that need not be have their price
+        assert unlike.evidence < people.evidence
+        return
+    challenge(models, rounds, ["internal_gains", "flow_gain"])
+    (searched, baseline), *_ = told  # what is the likeliest; the search that stands in here finds nothing
+    assert searched.settings == apart.settings and not baseline.effects
+    assert unlike.evidence > after.evidence
+    found = np.array([unlike.values[f"internal_gain_room_share@{zone}"] for zone in zones])
+    np.testing.assert_allclose(found / found.mean(), np.array(shares) / np.mean(shares), atol=0.15)
 
 
 def test_a_search_that_stops_short_of_what_was_found_is_not_taken(
