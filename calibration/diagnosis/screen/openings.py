@@ -13,8 +13,9 @@ from thermal._types import FloatArray
 #: How often a window is opened while people are there and while nobody is, and shut again [1/h].
 _OPENED, _OPENED_ALONE, _SHUT = 1.0 / 8.0, 1.0 / 200.0, 1.0
 
-#: What changes slower is no opening [h].
-_SLOW = 8.0
+#: What changes slower is no opening [h]. What is seen by the first may be likelier by the second: in warm weather
+#: windows stand open for hours, which a median over a third of a day takes for something slow.
+_SLOW = (8.0, 24.0)
 
 #: Areas that an opening may have [m2].
 _AREAS = np.geomspace(0.1, 6.0, 14)
@@ -43,11 +44,12 @@ def opened_when(lost: FloatArray, unit: FloatArray, presence: FloatArray, step: 
     ndarray, shape (n_time, n_zone)
         1 where one stands open [-].
     """
-    there, opened = presence > 0.05, np.zeros(lost.shape)
-    found = likely_courses(lost, unit, _AREAS, _SLOW, step, np.where(there, _OPENED, _OPENED_ALONE), _SHUT)
-    for k, mine, gained in zip(found.zones, np.moveaxis(found.paths, 1, 0), found.gains, strict=True):
-        often = (mine.mean(axis=0) < _LONGEST) & (mine[there].sum(axis=0) > _PRESENT * mine.sum(axis=0))
-        likely = np.where(often, gained, -np.inf)
-        if likely.max() > _SEEN:
-            opened[:, k] = mine[:, np.argmax(likely)]
+    there, opened, best = presence > 0.05, np.zeros(lost.shape), np.full(lost.shape[1], _SEEN)
+    for hours in _SLOW:
+        found = likely_courses(lost, unit, _AREAS, hours, step, np.where(there, _OPENED, _OPENED_ALONE), _SHUT)
+        for k, mine, gained in zip(found.zones, np.moveaxis(found.paths, 1, 0), found.gains, strict=True):
+            often = (mine.mean(axis=0) < _LONGEST) & (mine[there].sum(axis=0) > _PRESENT * mine.sum(axis=0))
+            likely = np.where(often, gained, -np.inf)
+            if likely.max() > best[k] and (hours == _SLOW[0] or best[k] > _SEEN):
+                opened[:, k], best[k] = mine[:, np.argmax(likely)], likely.max()
     return opened

@@ -54,6 +54,16 @@ def test_openings_are_found(area: float) -> None:
     assert (found * state).sum() > 0.85 * found.sum()
 
 
+@pytest.mark.parametrize("area", [0.7, 2.0])
+def test_windows_that_stand_open_for_half_a_day_are_found_as_well(area: float) -> None:
+    rng, state = np.random.default_rng(6), np.zeros(DAYS * DAY)
+    for begin in np.arange(DAYS) * DAY + rng.integers(100, 130, DAYS):
+        state[begin : begin + int(rng.integers(9, 72))] = 1.0
+    found = found_in(lost(state, UNIT, rng, area))[:, 0]
+    assert (found * state).sum() > 0.9 * state.sum()
+    assert (found * state).sum() > 0.9 * found.sum()
+
+
 def test_a_window_whose_heat_departs_from_its_law_is_told_from_a_small_loss_of_every_evening() -> None:
     rng = np.random.default_rng(4)
     state = opened(rng)
