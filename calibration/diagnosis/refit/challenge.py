@@ -66,10 +66,7 @@ def challenge(
     known = dict(rounds[0].before.effects)
     others = list(_others(models, rounds[0].before))
     for effects, least in _rivals(rounds, known):
-        differing = [_differing(models, e) for e, where in effects.items() if e in MAY_DIFFER and not where]
-        if len(zones) == 1 or not any(CATALOGUE[e].takes_zones for e in final.effects if e not in effects):
-            differing = []
-        fits = [(own, _fit(own, effects, final, least)) for own in (*others, *differing)]
+        fits = [(own, _fit(own, effects, final, least)) for own in (*others, *_differing(models, effects, final))]
         better = [(own, fit) for own, fit in fits if fit is not None and fit.evidence >= least]
         for own, other in sorted(better, key=lambda found: -found[1].evidence):
             with suppress(*FAILURES):
@@ -104,11 +101,14 @@ def _others(models: ModelComparison, drawn: Fit) -> Iterator[ModelComparison]:
             yield other
 
 
-def _differing(models: ModelComparison, effect: str) -> ModelComparison:
-    """Let rooms differ in an effect of the whole building."""
-    structure = models.settings.structure
-    uneven = tuple(sorted({*structure.uneven, effect}))
-    return models.built_as(replace(models.settings, structure=replace(structure, uneven=uneven)))
+def _differing(models: ModelComparison, effects: Effects, final: Fit) -> Iterator[ModelComparison]:
+    """Let rooms differ in each effect of the whole building, where all else that was found is of single rooms."""
+    left, structure = [e for e in final.effects if e not in effects], models.settings.structure
+    if len(models.case.building.zone_names) == 1 or not left or not all(CATALOGUE[e].takes_zones for e in left):
+        return
+    for effect in (e for e, where in effects.items() if e in MAY_DIFFER and not where):
+        uneven = tuple(sorted({*structure.uneven, effect}))
+        yield models.built_as(replace(models.settings, structure=replace(structure, uneven=uneven)))
 
 
 def _rivals(rounds: Sequence[Round], known: Effects) -> Iterator[tuple[Effects, float]]:
