@@ -102,7 +102,7 @@ def _others(models: ModelComparison, drawn: Fit) -> Iterator[ModelComparison]:
 
 
 def _differing(models: ModelComparison, effects: Effects, final: Fit) -> Iterator[ModelComparison]:
-    """Let rooms differ in each effect of the whole building, where nothing else was found or all else is of single rooms."""
+    """Let rooms differ in each effect of the whole building, where all else that was found is of single rooms."""
     left, structure = [e for e in final.effects if e not in effects], models.settings.structure
     if len(models.case.building.zone_names) == 1 or not all(CATALOGUE[e].takes_zones for e in left):
         return
