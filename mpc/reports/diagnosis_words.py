@@ -73,8 +73,8 @@ def diagnosis_verdict(result: Diagnosis) -> str:
         if shares:
             low, high = (significant(end) for end in (min(shares), max(shares)))
             text += (
-                f" Rooms differ in {called(effect)}: they have {low} to {high} times what is usual in this building; "
-                "while all were alike it looked like another effect."
+                f" Rooms differ in {called(effect)}: they have {low} to {high} times what is usual in this building "
+                f"({MAY_DIFFER[effect]} in calibration.json)."
             )
     if zoned := [name for name, scope in result.settings.scopes.items() if scope == "zone"]:
         what = [words for part, words in _OWN.items() if any(name.startswith(part) for name in zoned)]

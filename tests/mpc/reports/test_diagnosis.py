@@ -133,6 +133,16 @@ def test_an_error_with_windows_seen_open_is_no_forecast() -> None:
     assert told not in diagnosis_verdict(named("named"))
 
 
+def test_how_far_rooms_differ_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    result = diagnosed()
+    assert "Rooms differ" not in diagnosis_verdict(result)
+    structure = replace(result.settings.structure, uneven=("solar_gain",))
+    result = replace(result, settings=replace(result.settings, structure=structure))
+    for room, share in (("F1_N", 0.5), ("F1_S", 1.25)):
+        monkeypatch.setitem(result.final.values, f"solar_room_share@{room}", share)
+    assert "they have 0.500 to 1.25 times what is usual in this building" in diagnosis_verdict(result)
+
+
 def test_other_verdicts_name_nothing() -> None:
     assert "explains" in diagnosis_verdict(named("unexplained"))
     assert "explains too little" in diagnosis_verdict(named("no_gap"))
