@@ -162,7 +162,8 @@ class Structure:
                 raise ModelError(f"structure.{name}: expected true or false, got {getattr(self, name)!r}")
         if isinstance(self.turned, bool) or not isinstance(self.turned, int | float) or not abs(self.turned) <= 180.0:
             raise ModelError(f"structure.turned: expected -180 to 180 deg, got {self.turned!r}")
-        if isinstance(self.uneven, str) or not set(self.uneven) <= MAY_DIFFER.keys():
+        listed = isinstance(self.uneven, list | tuple)
+        if not listed or not all(isinstance(effect, str) and effect in MAY_DIFFER for effect in self.uneven):
             raise ModelError(f"structure.uneven: expected some of {tuple(MAY_DIFFER)}, got {self.uneven!r}")
         object.__setattr__(self, "uneven", tuple(self.uneven))  # a file has a list
         if self.emitter not in get_args(Unknown):

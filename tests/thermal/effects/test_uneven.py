@@ -65,6 +65,6 @@ def test_rooms_that_are_named_have_strengths_and_no_shares(building: Building) -
 def test_a_structure_comes_back_from_a_file_and_other_effects_are_refused() -> None:
     read = calibration_settings(None, {"structure": {"uneven": ["infiltration", "solar_gain"]}})
     assert read.structure == Structure(uneven=("infiltration", "solar_gain"))
-    for wrong in (("zone_mixing",), "infiltration"):
+    for wrong in (("zone_mixing",), "infiltration", None, 1, [["infiltration"]]):
         with pytest.raises(ModelError, match="structure.uneven: expected some of"):
             Structure(uneven=wrong)  # type: ignore[arg-type]
