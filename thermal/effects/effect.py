@@ -240,16 +240,21 @@ class EffectBuilder:
             found = found.of("facade", facade)
         return self.graph.own(found)
 
-    def share(self, room: str) -> ca.SX | float:
+    def share(self, room: str, effect: Effect | None = None) -> ca.SX | float:
         """Share that a room has of an effect of the whole building, 1 where rooms do not differ in it.
 
         Parameters
         ----------
         room : str
             Its name.
+        effect : Effect, optional
+            The one that this one modifies; this one by default.
         """
-        own = self.effect.id
-        return self.parameter(MAY_DIFFER[own], zone=room) if own in self.graph.structure.uneven else 1.0
+        of = effect or self.effect
+        if of.id not in self.graph.structure.uneven:
+            return 1.0
+        own = next(p for p in of.parameters if p.name == MAY_DIFFER[of.id])
+        return self.graph.own(own.of("zone", room))
 
     def key(self, what: str = "") -> str:
         """Name of a new class of this effect.

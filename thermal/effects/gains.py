@@ -44,12 +44,12 @@ def _of_sun(name: str, of: Callable[..., FloatArray], azimuth: float, tilt: floa
 def _panes(builder: EffectBuilder, value: ca.SX, name: str, **given: float) -> None:
     """Bring sun through every pane: a share to the floor or furniture, the rest to the other surfaces."""
     share, parts = builder.graph.own(SOLAR_GAIN.parameters[1]), dict[str, tuple[ca.SX, ca.SX, ca.SX]]()
-    differ = SOLAR_GAIN.id in builder.graph.structure.uneven
     for pane in builder.anatomy.panes:
         room = builder.anatomy.rooms[pane.zone]
-        key = f"{name} in {pane.zone}" if differ else name
+        of_room = builder.share(pane.zone, SOLAR_GAIN)
+        key = name if isinstance(of_room, float) else f"{name} in {pane.zone}"
         if key not in parts:
-            own = value * builder.graph.own(SOLAR_GAIN.parameters[2].of("zone", pane.zone)) if differ else value
+            own = value * of_room
             parts[key] = own, own * share, own * (1.0 - share)
         whole, to_mass, to_surfaces = parts[key]
         signal = _of_sun(name, _through, pane.azimuth, pane.tilt, **given)
